@@ -60,8 +60,15 @@ class Candidate(NamedTuple):
     @property
     def least_odds(self) -> float:
         """Log-odds above which it counts as in the path: even ones, and lower ones for the current lead."""
-        stays = self.params.stay_probability
+        stays = self.stay_probability
         return min(log(stays / (1.0 - stays)), 0.0) if self.leads and stays > 0.0 else 0.0
+
+    @property
+    def stay_probability(self) -> float:
+        """With which probability of being in the path it remains the lead. A vehicle that was seen to drive in our lane
+        stays in it almost always, but a path without lines or a route may be off by metres at 40 m as a bend begins."""
+        keeps_lane = self.has_driven and self.place is not None and self.place.drives_along
+        return self.params.stay_driving if keeps_lane else self.params.stay_probability
 
     @property
     def is_in_path(self) -> bool:
@@ -282,7 +289,7 @@ def _needed_probability(who: Candidate) -> float:
     item, params = who.item, who.params
     if who.leads:
         was_parked = _may_stand(item) and not who.has_driven
-        return max(params.stay_probability, params.stay_standing if was_parked else 0.0)
+        return max(who.stay_probability, params.stay_standing if was_parked else 0.0)
     return max(
         params.become_probability,
         params.become_oncoming if item.oncoming else 0.0,

@@ -5,6 +5,9 @@ from __future__ import annotations
 from math import copysign, erf, exp, log, sqrt
 from typing import NamedTuple
 
+_STEEPEST = 0.58
+"""tan 30°. A vehicle that changes lanes is turned by 10° at most, and the direction of an uncertain path 40 m ahead may
+be wrong by 20°; what drives at a larger angle to it does not drive along it."""
 _SUREST_M = 0.01
 SURE = 4.0
 """Limit of the log-odds: the sigmas themselves are not known that precisely."""
@@ -46,6 +49,11 @@ class Place(NamedTuple):
     def limit_m(self) -> float:
         """``left_m`` or ``right_m``, for the side where it is."""
         return self.left_m if self.middle_m >= 0.0 else self.right_m
+
+    @property
+    def drives_along(self) -> bool:
+        """Whether its course is along the path, as far as the path's direction is known."""
+        return self.sideways_mps is not None and abs(self.sideways_mps) < _STEEPEST * abs(self.forward_mps)
 
     def margin_m(self, extra_m: float = 0.0) -> float:
         """How far inside the path it is; negative if outside. extra_m widens the path."""

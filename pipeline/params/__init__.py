@@ -174,6 +174,7 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
             "become_standing": 0.0,
             "become_oncoming": 0.0,
             "stay_probability": 0.0,
+            "stay_driving": 0.0,
             "stay_standing": 0.0,
         },
         "acc": {

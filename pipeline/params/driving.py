@@ -217,6 +217,14 @@ class CipvParams(Section):
     stay_probability: float = slider(
         0.4, 0.0, 0.95, 0.05, "", "The lead is kept while both probabilities are at least this"
     )
+    stay_driving: float = slider(
+        0.05,
+        0.0,
+        0.95,
+        0.01,
+        "",
+        "The same for a lead that was seen to drive along the path: few vehicles leave their lane",
+    )
     stay_standing: float = slider(
         0.6, 0.0, 0.95, 0.05, "", "The same for a lead that may be standing and was never seen to drive"
     )

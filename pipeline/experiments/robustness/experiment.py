@@ -38,6 +38,7 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
         "cipv.stay_probability": 0.0,
         "cipv.stay_standing": 0.0,
     },
+    "driven leads kept like others": {"cipv.stay_driving": 0.4},
     "parked leads kept like others": {"cipv.stay_standing": 0.0},
     "camera at the edge trusted": {"cipv.become_camera": 0.0},
     "gaps without error": {"acc.gap_sigmas": 0.0},

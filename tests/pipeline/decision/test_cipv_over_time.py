@@ -102,6 +102,30 @@ def test_what_falls_behind_the_bumper_fails_for_that_alone() -> None:
     assert [gate.name for gate in item.gates if not gate.passed] == ["ahead"]
 
 
+@pytest.mark.parametrize(
+    ("what", "path_sigma_m", "stays_with", "leads"),
+    [
+        ("a bend begins, and the path does not know it yet", 5.0, 0.05, True),
+        ("the same, with what other leads need", 5.0, 0.4, False),
+        ("it takes an exit, beside lines", 0.3, 0.05, False),
+    ],
+)
+def test_a_lead_that_was_seen_to_drive_keeps_its_lane(
+    what: str, path_sigma_m: float, stays_with: float, leads: bool
+) -> None:
+    """It is followed for two seconds on a path known to 0.3 m, and is then 3.5 m beside the middle of the path."""
+    params = PARAMS.model_copy(update={"stay_driving": stays_with})
+    ego, state, choice = EgoState(0, 12.0, 0.0), CipvState(), None
+    for k in range(40):
+        item = dataclasses.replace(fused(1, 40.0, 0.0 if k < 20 else 3.5, velocity=(0.0, 0.0)), ranged_steady=20)
+        sigma_m = 0.3 if k < 20 else path_sigma_m
+        path = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), sigma_m))
+        state, choice = choose(state, describe([item], ego, MotionParams()), path, moment(ego, 0.1), params)
+        assert k >= 20 or k < 3 or choice.lead is not None
+    assert choice is not None
+    assert (choice.lead is not None) is leads, what
+
+
 def test_what_crosses_fast_is_judged_where_it_is_now() -> None:
     """A car crosses from the right at 6 m/s: it leads from the first frame on in which 0.9 m of it, its nose included,
     are inside, and not in the first in which they are not. One that is there at a
