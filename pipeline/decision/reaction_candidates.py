@@ -47,9 +47,9 @@ def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None, params: Ae
 
     If the path's uncertainty exceeds its width, no course counts as leading into it: in a bend, other traffic follows
     the road, as the car will. Oncoming traffic, which keeps to its lane, must be in ours with high certainty where the
-    two meet, also while it was seen for too short a time to be sure that it moves; where its lateral speed may be the jump
-    to another of its sides, it must be in ours already. Oncoming or crossing objects behind
-    the lead cannot be reached. What crosses and is gone before the car arrives is not met; its front enters first.
+    two meet, also while it was seen for too short a time to be sure that it moves; where its lateral speed may be the
+    jump to another of its sides, it must be in ours already. Oncoming or crossing objects behind the lead cannot be
+    reached. What crosses and is gone before the car arrives is not met; its front enters first.
 
     What is in the corridor must be seen there in this frame as well.
     """

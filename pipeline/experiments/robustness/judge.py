@@ -2,9 +2,9 @@
 
 A phantom is a lead or braking where the car could not meet any vehicle. Vehicles in the driven path, vehicles so near
 to its edge that either answer is right, and vehicles that enter it within three seconds are no phantoms. A vehicle is
-recognised by its place, or else by its box in the image, even if the place is that of another vehicle: then the lead is
-not invented but misplaced, a failure of its own. Braking for it counts as phantom braking, because the place is what the
-car brakes for.
+recognised by its place, or else by its box in the image, even if the place is that of another vehicle: then the lead
+is not invented but misplaced, a failure of its own. Braking for it counts as phantom braking, because the place is what
+the car brakes for.
 """
 
 from __future__ import annotations
