@@ -103,7 +103,8 @@ def test_how_much_of_a_box_is_seen_over_the_roof_is_a_parameter() -> None:
     [
         ("a nearer vehicle covers the point", (900.0, 220.0, 1010.0, 370.0), 35.0, None),
         ("a nearer vehicle at an unknown distance", (900.0, 220.0, 1010.0, 370.0), None, None),
-        ("a nearer vehicle covers only the other side", (900.0, 220.0, 1000.0, 370.0), 35.0, 46.0),
+        ("a nearer vehicle covers only the other side", (900.0, 220.0, 990.0, 370.0), 35.0, 46.0),
+        ("a nearer one ends just beside the point", (890.0, 220.0, 1002.0, 370.0), 35.0, None),
         ("it is seen through the windows of a much nearer one", (900.0, 220.0, 1010.0, 370.0), 15.0, 46.0),
         ("one behind it", (985.0, 240.0, 1039.0, 320.0), 55.0, 46.0),
         ("another box of the same vehicle", (978.0, 268.0, 1046.0, 334.0), 48.0, 46.0),
