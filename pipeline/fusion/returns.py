@@ -245,10 +245,10 @@ def _by_returns(seen: VisionMeasurement, points: _Points, in_front: F64, roof_sh
 
 
 def _may_be_of(in_front: F64, uv: F64, range_m: F64) -> np.ndarray:
-    """(P,) whether points may be of one of the boxes in front, (K, 6): they lie in it, or just beside it, at a range that
-    it may have. What is seen over or through a nearer vehicle is far beyond it. Just beside it, the next car of a parked
-    row shows a strip that is too narrow for a box of its own: a van 88 m away, seen past the end of such a row, was
-    placed at a third of its distance by that strip."""
+    """(P,) whether points may be of one of the boxes in front, (K, 6): they lie in it, or just beside it, at a range
+    that it may have. What is seen over or through a nearer vehicle is far beyond it. Just beside it, the next car of a
+    parked row shows a strip that is too narrow for a box of its own: a van 88 m away, seen past the end of such a row,
+    was placed at a third of its distance by that strip."""
     x1, y1, x2, y2, nearest_m, farthest_m = in_front.T
     side = _EDGE_SHARE * (x2 - x1)
     x1, x2 = x1 - side, x2 + side
