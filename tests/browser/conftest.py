@@ -33,6 +33,8 @@ _SHELL = Path("/usr/bin/chromium-headless-shell")
 _BROWSER = _SHELL if _SHELL.exists() else CHROMIUM
 """The same engine without windows of its own takes a fifth less processor time."""
 WAIT_MS = 180_000
+_SERVERS = 2
+"""That of all files, and that of the file that is run."""
 ColorScheme = Literal["dark", "light"]
 START = 60
 """A frame of the scenario with traffic around."""
@@ -163,14 +165,16 @@ class Pages:
 
     def __init__(self, browser: Browser) -> None:
         self._browser = browser
-        self._spare: list[Page] = []
+        self._spare: dict[str, list[Page]] = {}
+        """By origin: for another server, a page would take a new process. Those of the last ``_SERVERS`` are kept."""
 
-    def take(self, width: int, height: int, color_scheme: ColorScheme, **context: Any) -> Page:
-        """A page without stored data; a new one if it needs its own context."""
+    def take(self, origin: str, width: int, height: int, color_scheme: ColorScheme, **context: Any) -> Page:
+        """A page without stored data for this origin; a new one if it needs its own context."""
         size = ViewportSize(width=width, height=height)
-        if context or not self._spare:
+        spare = self._spare.get(origin)
+        if context or not spare:
             return self._browser.new_page(viewport=size, color_scheme=color_scheme, **context)
-        page = self._spare.pop()
+        page = spare.pop()
         page.set_viewport_size(size)
         page.emulate_media(color_scheme=color_scheme)
         return page
@@ -180,7 +184,7 @@ class Pages:
         cleared."""
         if page.is_closed():
             return
-        # first: a page may store something as it is left. Of the same server: another's would take a process of its own
+        # first: a page may store something as it is left
         page.goto(f"{origin}/icon.svg")
         devtools = page.context.new_cdp_session(page)
         devtools.send("Storage.clearDataForOrigin", {"origin": origin, "storageTypes": "all"})
@@ -189,7 +193,10 @@ class Pages:
         page.context.clear_permissions()
         page.unroute_all()
         page.mouse.move(0, 0)
-        self._spare.append(page)
+        self._spare[origin] = [*self._spare.pop(origin, []), page]
+        while len(self._spare) > _SERVERS:
+            for old in self._spare.pop(next(iter(self._spare))):
+                old.context.close()
 
 
 @pytest.fixture(scope="session")
@@ -235,7 +242,7 @@ def opening(pages: Pages, site: Site) -> Iterator[OpenPage]:
             if _leaves(request.url, own):
                 complaints.append(request.url)
 
-        page = pages.take(width, height, color_scheme, **context)
+        page = pages.take(own, width, height, color_scheme, **context)
         listeners = {"console": said, "request": asked, "pageerror": lambda error: complain(str(error))}
         opened.append((page, listeners, own == site.address and not context))
         page.context.set_default_timeout(WAIT_MS)  # of the requests, too, that the test sends itself

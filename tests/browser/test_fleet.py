@@ -59,7 +59,7 @@ def open_fleet(pages: Pages, fleet_site: Site) -> Iterator[OpenPage]:
     with opening(pages, fleet_site) as begin:
 
         def opened(**how: object) -> Page:
-            page = begin(address=f"{fleet_site.address}/", **how)
+            page = begin(**how)
             page.get_by_role("button", name="Fleet", exact=True).click()
             settled(page)
             return page

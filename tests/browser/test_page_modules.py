@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.browser.conftest import OpenPage
+from tests.browser.conftest import OpenPage, Pages, Site, opening
 
 ROWS = """async () => {
   const { metricsTable } = await import("/js/panels/metrics_table.js");
@@ -58,49 +59,54 @@ FIELD = """async () => {
   const field = numberField({ label: "Width of the test", least: 0, most: 8, step: 0.1 }, { value: "7" });
   window.heard = [];
   field.addEventListener("change", () => window.heard.push(numberOf(field)));
+  document.querySelector("#params [aria-label='Width of the test']")?.remove();
   document.querySelector("#params").prepend(field);
 }"""
+
+
+@pytest.fixture(scope="module")
+def around(pages: Pages, site: Site) -> Iterator[Page]:
+    """A page from which modules are imported, whose state no test here depends on or changes."""
+    with opening(pages, site) as open_page:
+        yield open_page()
 
 
 def tags(page: Page, cars: list[tuple[int, float, float, bool]], **ids: int) -> list[dict[str, Any]]:
     return page.evaluate(TAGS, [cars, {"lead": None, "chosen": None, "next": None, **ids}])
 
 
-def test_a_change_that_rounds_to_nothing_is_no_improvement(open_page: OpenPage) -> None:
-    page = open_page()
-    assert page.evaluate(ROWS) == [["=", "same"], ["−0.02", "better"], ["−1", "better"]]
+def test_a_change_that_rounds_to_nothing_is_no_improvement(around: Page) -> None:
+    assert around.evaluate(ROWS) == [["=", "same"], ["−0.02", "better"], ["−1", "better"]]
 
 
-def test_in_a_dense_street_no_tag_of_the_plan_covers_a_car_or_another_tag(open_page: OpenPage) -> None:
+def test_in_a_dense_street_no_tag_of_the_plan_covers_a_car_or_another_tag(around: Page) -> None:
     cars = [(100 + i, x, y, False) for i, (_, x, y, _) in enumerate(STREET)]
-    drawn = tags(open_page(), cars)
+    drawn = tags(around, cars)
     assert 4 <= len(drawn) < len(cars)
     assert not [tag["words"] for tag in drawn if tag["onACar"] or tag["onATag"]]
 
 
 def test_the_lead_the_selected_the_next_and_those_in_the_path_have_a_tag_where_there_is_no_room(
-    open_page: OpenPage,
+    around: Page,
 ) -> None:
     cars = [(100 + i, x, y, False) for i, (_, x, y, _) in enumerate(STREET)]
     chosen, lead, following, ahead = 120, 1, 2, 3
     cars += [(ahead, 30.0, 0.0, True), (following, 20.0, 0.0, True), (lead, 10.0, 0.0, True)]
-    drawn = tags(open_page(), cars, lead=lead, chosen=chosen, next=following)
+    drawn = tags(around, cars, lead=lead, chosen=chosen, next=following)
     first = [re.search(r"#\d+", tag["words"]) for tag in drawn[:4]]
     assert [found and found[0] for found in first] == ["#1", "#120", "#2", "#3"]
     assert not [tag["words"] for tag in drawn if tag["onATag"]]
 
 
-def test_events_of_different_weight_differ_in_shape_as_well_as_in_colour(open_page: OpenPage) -> None:
-    found = open_page().evaluate(SHAPES)
+def test_events_of_different_weight_differ_in_shape_as_well_as_in_colour(around: Page) -> None:
+    found = around.evaluate(SHAPES)
     assert [words for words, *_ in found] == ["information", "notice", "warning", "alarm", "mark"]
     assert len({color for _, color, _ in found}) == len({shape for *_, shape in found}) == len(found)
 
 
 @pytest.mark.parametrize("axis", ["deltaY", "deltaX"])
-def test_shift_and_the_wheel_pan_the_timeline_also_in_browsers_that_turn_the_wheel(
-    open_page: OpenPage, axis: str
-) -> None:
-    first, end = open_page().evaluate(WHEEL, {axis: 50})
+def test_shift_and_the_wheel_pan_the_timeline_also_in_browsers_that_turn_the_wheel(around: Page, axis: str) -> None:
+    first, end = around.evaluate(WHEEL, {axis: 50})
     assert first == pytest.approx(end) == pytest.approx(5.0)
 
 
@@ -109,26 +115,24 @@ def test_shift_and_the_wheel_pan_the_timeline_also_in_browsers_that_turn_the_whe
     [("1,5", 1.5), ("1.5", 1.5), ("−1,5", -1.5), (" 15 ", 15), ("", None), ("1,234.5", "nothing"), ("x", "nothing")],
 )
 def test_a_number_may_be_typed_with_a_comma_and_what_is_none_is_taken_back(
-    open_page: OpenPage, typed: str, heard: Any
+    around: Page, typed: str, heard: Any
 ) -> None:
-    page = open_page()
-    page.evaluate(FIELD)
-    field = page.get_by_label("Width of the test")
+    around.evaluate(FIELD)
+    field = around.get_by_label("Width of the test")
     field.press("Control+a")
     field.press_sequentially(typed) if typed else field.press("Delete")
     expect(field).to_have_attribute("aria-invalid", str(heard == "nothing").lower())
     field.press("Enter")
-    assert page.evaluate("window.heard") == ([] if heard == "nothing" else [heard])
+    assert around.evaluate("window.heard") == ([] if heard == "nothing" else [heard])
     expect(field).to_have_value("7" if heard == "nothing" else f"{heard:g}" if heard is not None else "")
 
 
-def test_arrow_keys_step_a_number_within_its_limits(open_page: OpenPage) -> None:
-    page = open_page()
-    page.evaluate(FIELD)
-    field = page.get_by_label("Width of the test")
+def test_arrow_keys_step_a_number_within_its_limits(around: Page) -> None:
+    around.evaluate(FIELD)
+    field = around.get_by_label("Width of the test")
     for key in ("ArrowUp", "ArrowUp", "ArrowDown"):
         field.press(key)
-    assert page.evaluate("window.heard") == [7.1, 7.2, 7.1]
+    assert around.evaluate("window.heard") == [7.1, 7.2, 7.1]
     field.fill("7,95")
     field.press("ArrowUp")
     expect(field).to_have_value("8")

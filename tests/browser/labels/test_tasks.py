@@ -149,7 +149,10 @@ def test_proposals_are_accepted_exported_and_scored(hand: Hand, labels: Labels, 
 
 
 def test_the_outcome_of_a_task_does_not_replace_a_later_answer(hand: Hand, labels: Labels, site: Site):
+    """The task proposes what is in two seconds: a whole drive takes as many seconds of processor time."""
     whole_drive(hand.page, site)
+    mark = "async (ends) => (await import('/js/labeling/state/marked_frames.js')).markAll(...ends)"
+    hand.page.evaluate(mark, [START, START + 19])
     hand.page.evaluate("""async () => {
         const commands = await import("/js/labeling/acts/commands.js");
         commands.propose();
@@ -157,6 +160,7 @@ def test_the_outcome_of_a_task_does_not_replace_a_later_answer(hand: Hand, label
     }""")
     labels.wait_for(lambda now: len(now.leads) > 0)
     expect(hand.page.locator(".said")).to_have_text(re.compile(r"^extended #3 · proposed \d+ tracks"))
+    hand.page.evaluate(mark, [START, START + 19])
     hand.keys("p")
     expect(hand.page.locator(".said")).to_have_text(re.compile(r"^(proposed|nothing|no )"))
 
