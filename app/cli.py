@@ -18,6 +18,7 @@ from app.core.stop_signals import as_interrupts
 from app.core.terminal import make_safe, one_line
 from pipeline.common.errors import BadInput
 from pipeline.common.files.user_files import Overloaded
+from pipeline.common.garbage_collection import collect_less_often
 
 COMMANDS = {
     "demo": "app.commands.serve:Demo",
@@ -62,6 +63,7 @@ _PATHS = ConstructorRegistry()
 
 def main(arguments: list[str] | None = None) -> None:
     """Entry point of the console script."""
+    collect_less_often()
     typed = sys.argv[1:] if arguments is None else arguments
     make_safe()
     try:
