@@ -6,6 +6,7 @@ import ast
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from types import CodeType, FrameType
 
@@ -32,15 +33,16 @@ _TOOLS = ("app/bench", "pipeline/training", "pipeline/experiments")
 """Measure and train, with data that they made themselves."""
 
 
-def decoders() -> set[str]:
+@cache
+def decoders() -> frozenset[str]:
     """``file:function`` of every function that decodes."""
     files = (path for folder in _FOLDERS for path in sorted((ROOT / folder).rglob("*.py")))
-    return {
+    return frozenset(
         f"{path}:{function}"
         for path, file in ((str(file.relative_to(ROOT)), file) for file in files)
         if not path.startswith(_TOOLS)
         for function in _in(ast.parse(file.read_text(encoding="utf-8")), ())
-    }
+    )
 
 
 def ran(call: Callable[[], object]) -> set[str]:
