@@ -67,7 +67,7 @@ def freeze_loaded_objects(loaded: str) -> None:
 
 def collect_less_often() -> None:
     """A generation-0 collection runs only after more allocations than one frame makes. At the beginning of a program:
-    while modules are imported, the collector takes a seventh of the time and finds nothing."""
+    while modules are imported, the collector takes a tenth of the time and finds nothing."""
     gc.set_threshold(_COLLECT_AFTER, *gc.get_threshold()[1:])
 
 

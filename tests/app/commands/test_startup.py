@@ -66,7 +66,7 @@ def test_a_users_process_has_neither_the_experiments_nor_what_trains_the_detecto
 
 
 def test_garbage_is_collected_less_often_before_a_command_is_imported() -> None:
-    """Otherwise, the collector takes a seventh of the time in which modules are imported."""
+    """Otherwise, the collector takes a tenth of the time in which modules are imported."""
     told = "import app.commands.keys as chosen, gc\ndef asked(*_): print(gc.get_threshold()[0])\nchosen.Keys = asked"
     typed = "import sys\nfrom app.cli import main\ntry: main(['keys'])\nexcept SystemExit: pass"
     assert int(run(f"{told}\n{typed}").splitlines()[0]) > 7 * 700

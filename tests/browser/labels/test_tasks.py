@@ -149,7 +149,7 @@ def test_proposals_are_accepted_exported_and_scored(hand: Hand, labels: Labels, 
 
 
 def test_the_outcome_of_a_task_does_not_replace_a_later_answer(hand: Hand, labels: Labels, site: Site):
-    """The task proposes what is in two seconds: a whole drive takes as many seconds of processor time."""
+    """The task proposes labels of two seconds: those of the whole drive take seven seconds of processor time."""
     whole_drive(hand.page, site)
     mark = "async (ends) => (await import('/js/labeling/state/marked_frames.js')).markAll(...ends)"
     hand.page.evaluate(mark, [START, START + 19])
