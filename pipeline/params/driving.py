@@ -223,7 +223,8 @@ class CipvParams(Section):
         0.95,
         0.01,
         "",
-        "The same for a lead that was seen to drive along the path: few vehicles leave their lane",
+        "A lead that was seen to drive along the path is kept while it is in it with at least this probability: few "
+        "vehicles leave their lane",
     )
     stay_standing: float = slider(
         0.6, 0.0, 0.95, 0.05, "", "The same for a lead that may be standing and was never seen to drive"
