@@ -66,7 +66,8 @@ class Candidate(NamedTuple):
     @property
     def stay_probability(self) -> float:
         """With which probability of being in the path it remains the lead. A vehicle that was seen to drive in our lane
-        stays in it almost always, but a path without lines or a route may be off by metres at 40 m as a bend begins."""
+        stays in it almost always, but a path without lines or a route may be off by metres at 40 m as a bend begins.
+        docs/reference/accuracy.md says on which streets its limit was chosen, and on which it was checked."""
         keeps_lane = self.has_driven and self.place is not None and self.place.drives_along
         return self.params.stay_driving if keeps_lane else self.params.stay_probability
 
