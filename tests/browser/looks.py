@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from typing import Any
 
 from playwright.sync_api import FloatRect, Locator, Page, expect
 
@@ -93,6 +94,34 @@ def pauses() -> Iterator[float]:
     while time.monotonic() < deadline:
         yield pause_ms
         pause_ms = min(max(2 * pause_ms, 20.0), 320.0)
+
+
+_SHOW_INSTEAD = """async (wanted) => {
+  const { get, on, set } = await import("/js/core/store.js");
+  const isPart = (part) => part !== null && typeof part === "object" && !Array.isArray(part);
+  const changed = (now, part) => {
+    if (!isPart(part)) return part;
+    const parts = Object.entries(part).map(([key, value]) => [key, changed(now?.[key], value)]);
+    return { ...now, ...Object.fromEntries(parts) };
+  };
+  const differs = (now, part) =>
+    isPart(part)
+      ? Object.keys(part).some((k) => differs(now?.[k], part[k]))
+      : JSON.stringify(now) !== JSON.stringify(part);
+  const hold = () => {
+    for (const [key, part] of Object.entries(window.wanted))
+      if (differs(get(key), part)) set(key, changed(get(key), part));
+  };
+  if (!window.wanted) on(["state", "frame"], hold);
+  window.wanted = wanted;
+  hold();
+}"""
+
+
+def show_instead(page: Page, **parts: dict[str, Any]) -> None:
+    """Change parts of the page's ``state`` and ``frame``, as the server would, until the next call. What the server
+    sends meanwhile, at whatever time, is changed likewise."""
+    page.evaluate(_SHOW_INSTEAD, parts)
 
 
 def colours(page: Page, canvas: str) -> int:

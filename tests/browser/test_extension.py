@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.browser.conftest import START, OpenPage, Site
-from tests.browser.looks import box_of, wait_for_frame, whole_drive
+from tests.browser.looks import box_of, show_instead, wait_for_frame, whole_drive
 
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
@@ -68,15 +68,9 @@ def test_a_camera_layer_is_added_by_one_call(open_page: OpenPage) -> None:
 def test_objects_of_a_further_sensor_are_shown_by_letter_and_colour(open_page: OpenPage) -> None:
     page = open_page()
     wait_for_frame(page, START)
-    page.evaluate(
-        """async () => {
-          const { get, set } = await import("/js/core/store.js");
-          const frame = get("frame");
-          const [first, second, ...rest] = frame.result.objects;
-          const objects = [{ ...first, source: "VR" }, { ...second, source: "R" }, ...rest];
-          set("frame", { ...frame, result: { ...frame.result, objects } });
-        }"""
-    )
+    first, second, *rest = page.evaluate("async () => (await import('/js/core/store.js')).get('frame').result.objects")
+    objects = [first | {"source": "VR"}, second | {"source": "R"}, *rest]
+    show_instead(page, frame={"result": {"objects": objects}})
     expect(page.locator("#object-facts")).to_contain_text("1 VR · 1 R")
     for source, role in (("VR", "fused"), ("R", "lidar")):
         expect(page.locator("#objects .pill").get_by_text(source, exact=True)).to_have_attribute("data-role", role)

@@ -8,40 +8,25 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.conftest import START, OpenPage, Site
-from tests.browser.looks import wait_for_frame, whole_drive
+from tests.browser.looks import show_instead, wait_for_frame, whole_drive
 
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
-HOLD = """async (wanted) => {
-  const { get, on, set } = await import("/js/core/store.js");
-  const differs = (now, then) => Object.entries(then).some(([key, value]) => now[key] !== value);
-  const hold = () => {
-    const { state, frame, notes } = window.wanted;
-    if (differs(get("state"), state)) set("state", { ...get("state"), ...state });
-    const shown = get("frame");
-    if (differs(shown, frame) || shown.result.notes !== notes)
-      set("frame", { ...shown, ...frame, result: { ...shown.result, notes } });
-  };
-  if (!window.wanted) on(["state", "frame"], hold);
-  window.wanted = wanted;
-  hold();
-  return document.querySelector("#workspace").getBoundingClientRect().top;
-}"""
-"""Show the current frame with these notes, values and values of the source, even if the server sends it again; the top
-of what lies below the notices."""
 INFO = {"level": "info", "text": "Lane lines by a network"}
 SILENT = {"level": "warning", "text": "Waiting for sensors: lidar silent, camera silent, gnss silent, ego silent"}
 MANY = ["lidar stale", "the far view was left out", "Camera or LiDAR has turned: yaw +0.1°, pitch +2.3°"]
 
 
 def say(page: Page, notes: list[str], *notices: dict[str, str]) -> Any:
-    return page.evaluate(HOLD, {"notes": notes, "frame": {}, "state": {"notices": list(notices)}})
+    """Show these notes of the frame and notices of the server; the top of what lies below."""
+    show_instead(page, frame={"result": {"notes": notes}}, state={"notices": list(notices)})
+    return page.evaluate("document.querySelector('#workspace').getBoundingClientRect().top")
 
 
 def settled(open_page: OpenPage, site: Site) -> Page:
     page = open_page()
     wait_for_frame(page, START)
-    whole_drive(page, site)  # the server says nothing more that would undo what a test says
+    whole_drive(page, site)
     return page
 
 
@@ -100,7 +85,7 @@ def test_a_note_that_was_dismissed_stays_away_with_other_numbers(open_page: Open
 def follow(page: Page, made_unix_ms: int) -> None:
     """The shown frame as if it came from live sensors and was made at this time."""
     live = {"live": True, "playing": True}
-    page.evaluate(HOLD, {"notes": [], "frame": {"madeUnixMs": made_unix_ms}, "state": live})
+    show_instead(page, frame={"madeUnixMs": made_unix_ms, "result": {"notes": []}}, state=live)
 
 
 def test_live_data_that_stops_coming_looks_old(open_page: OpenPage, site: Site) -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from itertools import pairwise
 
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Page, expect
 
 from tests.browser.conftest import START, OpenPage, Site
-from tests.browser.looks import wait_for_frame, whole_drive
+from tests.browser.looks import show_instead, wait_for_frame, whole_drive
 
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
@@ -94,12 +94,10 @@ def test_share_in_the_menu_says_that_it_has_copied(open_page: OpenPage) -> None:
     assert "frame=60" in page.evaluate("navigator.clipboard.readText()")
 
 
-WITHOUT = """async ([hasImage, hasPoints]) => {
-  const { get, set } = await import("/js/core/store.js");
-  set("state", { ...get("state"), uri: "pcap:no-camera" });
-  set("frame", { ...get("frame"), image: hasImage ? { width: 640, height: 360 } : null, count: hasPoints ? 9 : 0 });
-}"""
-"""A frame of another recording."""
+def show_other(page: Page, *, image: bool, points: bool) -> None:
+    """A frame of another recording."""
+    frame = {"image": {"width": 640, "height": 360} if image else None, "count": 9 if points else 0}
+    show_instead(page, state={"uri": "pcap:no-camera"}, frame=frame)
 
 
 def test_what_a_recording_has_no_sensor_for_is_not_offered(open_page: OpenPage) -> None:
@@ -108,13 +106,13 @@ def test_what_a_recording_has_no_sensor_for_is_not_offered(open_page: OpenPage) 
     chips, tools = page.locator("#camera-layers"), page.locator(".view-tools[data-view=camera]")
     points = page.locator("[data-layer=points], [data-layer=cuboids], [data-layer=planPoints], #bev ~ * .color-by")
     expect(points.locator("visible=true")).to_have_count(4)
-    page.evaluate(WITHOUT, [False, False])
+    show_other(page, image=False, points=False)
     expect(chips).to_be_hidden()
     expect(tools).to_be_hidden()
-    page.evaluate(WITHOUT, [True, False])
+    show_other(page, image=True, points=False)
     expect(chips).to_be_visible()
     expect(points.locator("visible=true")).to_have_count(0)
-    page.evaluate(WITHOUT, [False, True])
+    show_other(page, image=False, points=True)
     expect(chips).to_be_visible()
     expect(points.locator("visible=true")).to_have_count(4)
 

@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from app.streaming.sent_image import WIDTH_STEP_PX
 from tests.browser.conftest import START, OpenPage, Site
-from tests.browser.looks import box_of, pixels, repainted, settle, wait_for_frame, whole_drive
+from tests.browser.looks import box_of, pixels, repainted, settle, show_instead, wait_for_frame, whole_drive
 
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
@@ -216,18 +216,12 @@ def test_roadside_returns_are_fainter_in_the_image_than_vehicles(open_page: Open
     assert {alphas[key] for key in vehicles} == {1}
 
 
-FAR_VIEW = """async (window) => {
-  const { get, set } = await import("/js/core/store.js"), frame = get("frame");
-  set("frame", { ...frame, display: { ...frame.display, ...window } });
-}"""
-"""The shown frame with these windows of far views."""
-
-
 def test_the_windows_of_far_views_are_told_apart_and_switched_off_together(open_page: OpenPage, site: Site):
     page = opened(open_page, site)
     seen = [pixels(page, "#camera")]
     for window in ("far_view", "lanes_far_view"):
-        page.evaluate(FAR_VIEW, {"far_view": None, "lanes_far_view": None, window: [100, 60, 500, 300]})
+        windows = {"far_view": None, "lanes_far_view": None, window: [100, 60, 500, 300]}
+        show_instead(page, frame={"display": windows})
         seen.append(pixels(page, "#camera"))
     assert len(set(seen)) == 3
     page.locator("[data-layer=farView]").click()

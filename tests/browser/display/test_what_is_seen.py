@@ -12,6 +12,7 @@ from pipeline.types import Result
 from tests.browser.conftest import OpenPage, Site
 from tests.browser.display.conftest import WAIT_S, OpenDisplay, is_now, keep
 from tests.browser.judges import LOW_CONTRAST
+from tests.browser.looks import settle, show_instead
 
 SIZES = [(1024, 600), (1280, 800), (800, 480), (720, 450), (390, 844)]
 FINGER_PX = 48
@@ -143,20 +144,11 @@ def test_the_figures_are_those_of_the_result(open_display: OpenDisplay, site: Si
     expect(page.locator("#acc")).to_have_attribute("data-state", result["acc"]["state"])
 
 
-SHOW = """async (change) => {
-  const { get, on, set } = await import("/js/core/store.js");
-  const hold = () => {
-    const frame = get("frame"), { result } = frame;
-    if (result.acc.reason !== window.command.reason) {
-      set("frame", { ...frame, result: { ...result, acc: { ...result.acc, ...window.command } } });
-    }
-  };
-  if (!window.command) on(["frame"], hold);
-  window.command = change;
-  hold();
-  await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
-}"""
-"""Another command with the shown frame, even if the server sends the frame again with an image of another size."""
+def show_command(page: Page, **command: str | int) -> None:
+    """Another command of ACC with the shown frame."""
+    show_instead(page, frame={"result": {"acc": command}})
+    settle(page)
+
 
 TOLD = """() => {
   const reason = document.querySelector("#acc-reason");
@@ -177,7 +169,7 @@ def test_what_acc_does_not_do_is_told_to_its_end_without_moving_the_rest(
     is_now(page, "paused")
     told = []
     for reason in ("free road", "camera and LiDAR disagree about where cars are: ACC will not accelerate"):
-        page.evaluate(SHOW, {"state": "cruise", "reason": reason})
+        show_command(page, state="cruise", reason=reason)
         told.append(page.evaluate(TOLD))
     assert [each["whole"] for each in told] == [True, True]
     assert told[0]["top"] == told[1]["top"]
@@ -202,10 +194,10 @@ def test_whatever_acc_reacts_to_is_drawn_also_when_it_is_not_the_lead(open_displ
     result = httpx.get(f"{site.address}/api/result", timeout=WAIT_S).json()
     other = next(o for o in result["objects"] if o["bev"] and o["id"] != result["cipv"]["id"] and o["distance_m"] < 60)
     assert page.evaluate(ALARM_PIXELS, "#plan") == 0
-    page.evaluate(SHOW, {"state": "warn", "reason": f"would hit #{other['id']} in 1.9 s", "object_id": other["id"]})
+    show_command(page, state="warn", reason=f"would hit #{other['id']} in 1.9 s", object_id=other["id"])
     assert page.evaluate(ALARM_PIXELS, "#plan") > 20
     expect(page.locator("#acc-reason")).to_contain_text(f"would hit #{other['id']}")
-    page.evaluate(SHOW, {"state": "warn", "reason": "it is not here any more", "object_id": 987654})
+    show_command(page, state="warn", reason="it is not here any more", object_id=987654)
     assert page.evaluate(ALARM_PIXELS, "#plan") == 0
 
 
@@ -215,7 +207,7 @@ def test_warning_and_braking_differ_in_colour_word_and_shape(open_display: OpenD
     is_now(page, "paused")
     looks = set()
     for state in ("follow", "warn", "full_brake"):
-        page.evaluate(SHOW, {"state": state, "reason": f"for a test of {state}"})
+        show_command(page, state=state, reason=f"for a test of {state}")
         looks.add(
             page.evaluate(
                 "() => [getComputedStyle(document.querySelector('#acc')).backgroundColor, "

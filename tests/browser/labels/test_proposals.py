@@ -7,7 +7,7 @@ from playwright.sync_api import expect
 
 from tests.browser.conftest import START, OpenPage, Site
 from tests.browser.labels.hands import Hand, Labels, begin, draw, is_at
-from tests.browser.looks import COUNT
+from tests.browser.looks import COUNT, show_instead
 
 NO_VISER = ("status of 502",)
 """The server in these tests has no 3D view."""
@@ -63,20 +63,14 @@ def test_a_search_that_finds_nothing_names_what_it_looked_for(hand: Hand):
     expect(hand.page.locator(".said")).to_have_text("No queued frame after this frame")
 
 
-TASK = """async (running) => {
-  const { get, set } = await import("/js/core/store.js");
-  const state = get("state"), task = { id: 900, what: "propose", done: 8, total: 100, note: "", error: null, running };
-  set("state", { ...state, labels: { ...state.labels, task } });
-}"""
-
-
 def test_while_labels_are_proposed_the_list_says_so_and_offers_it_no_second_time(hand: Hand):
     propose = hand.page.locator(".begin")
     expect(propose).to_be_visible()
-    hand.page.evaluate(TASK, True)
+    task = {"id": 900, "what": "propose", "done": 8, "total": 100, "note": "", "error": None, "running": True}
+    show_instead(hand.page, state={"labels": {"task": task}})
     expect(hand.page.locator(".track-list")).to_contain_text("Proposing labels: 8 of 100 …")
     expect(propose).to_be_hidden()
-    hand.page.evaluate(TASK, False)
+    show_instead(hand.page, state={"labels": {"task": task | {"running": False}}})
     expect(propose).to_be_visible()
 
 
