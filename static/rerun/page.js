@@ -1,8 +1,8 @@
-// @ts-check
 /**
  * The page around rerun's web viewer: it starts the viewer on this drive at this moment, and reports errors. The
  * viewer's script, loaded before this one, defines `wasm_bindgen`.
  */
+import { NEEDS_WEBGL, webGl } from "../js/views/webgl.js";
 
 /**
  * @typedef {Object} Handle
@@ -62,6 +62,7 @@ function watch(handle) {
 }
 
 async function open() {
+  if (webGl() === "none") return say(`rerun ${NEEDS_WEBGL}`); // the viewer would only say that it found no adapter
   stayHere();
   await bindgen({ module_or_path: "/rerun/re_viewer_bg.wasm" });
   /** @type {Handle} */

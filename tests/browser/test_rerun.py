@@ -11,7 +11,7 @@ from app.web.guards.tokens import Tokens
 from app.web.server import create_app
 from tests.app.web.serving import serving
 from tests.browser.conftest import Site
-from tests.browser.test_look import SCREENS
+from tests.browser.test_look import SCREENS, WITHOUT_WEBGL
 
 WAIT_MS = 120_000
 
@@ -62,5 +62,17 @@ def test_the_viewer_opens_the_drive_of_a_server_that_requires_a_token(site: Site
             assert replay.value.status == 200
             expect(page.locator("html")).to_have_attribute("data-viewer", "started", timeout=WAIT_MS)
             expect(page.locator("#said")).to_have_text("")
+    finally:
+        context.close()
+
+
+def test_without_webgl_the_viewers_page_says_so(site: Site, browser: Browser):
+    context = browser.new_context()
+    try:
+        page = context.new_page()
+        page.add_init_script(f"({WITHOUT_WEBGL})()")
+        page.goto(f"{site.address}/rerun/")
+        expect(page.locator("#said")).to_have_text("rerun needs WebGL 2, which this browser lacks or has switched off.")
+        expect(page.locator("#viewer")).to_be_hidden()
     finally:
         context.close()

@@ -4,13 +4,12 @@
 import { tell } from "../core/connection.js";
 import { $, el } from "../core/dom.js";
 import { get, on } from "../core/store.js";
-import { webGl } from "./webgl.js";
+import { NEEDS_WEBGL, webGl } from "./webgl.js";
 
 /** Identifies this page's 3D view at the server. */
 const NAME = [...crypto.getRandomValues(new Uint8Array(16))].map((each) => each.toString(16).padStart(2, "0")).join("");
 /** Narrower frames are scaled down, since there the 3D view's own panel would cover the scene. */
 const LEAST_PX = 600;
-const NO_WEBGL = "The 3D view needs WebGL 2, which this browser lacks or has switched off.";
 const SOFTWARE =
   "The 3D view is drawn without a graphics card and may be slow: see hardware acceleration in the browser's settings.";
 /** viser's own notice of the same, by its id. */
@@ -34,7 +33,7 @@ export function open() {
   const body = $("#three-body");
   if (body.firstChild) return;
   const drawsWith = webGl();
-  if (drawsWith === "none") return body.append(el("p", { class: "busy", textContent: NO_WEBGL }));
+  if (drawsWith === "none") return body.append(el("p", { class: "busy", textContent: `The 3D view ${NEEDS_WEBGL}` }));
   tell("page_3d", NAME);
   const note = el("p", { class: "busy", aria: { role: "status" }, textContent: "Opening the 3D view …" });
   const view = el("iframe", { src: `viser/of/${NAME}/`, title: "3D view" });

@@ -1,5 +1,7 @@
 /** What this browser draws 3D with. */
 
+/** After the name of a view. */
+export const NEEDS_WEBGL = "needs WebGL 2, which this browser lacks or has switched off.";
 /** Parts of the names of renderers that use no graphics card. */
 const SOFTWARE = /swiftshader|llvmpipe|softpipe|software/i;
 

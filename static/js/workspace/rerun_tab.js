@@ -3,13 +3,11 @@ import { request } from "../core/api.js";
 import { el } from "../core/dom.js";
 import { NO_DRIVE } from "../drive/live_buffer.js";
 import { get } from "../core/store.js";
-import { webGl } from "../views/webgl.js";
+import { NEEDS_WEBGL, webGl } from "../views/webgl.js";
 
 /** Narrower panes use the compact blueprint. */
 const NARROW_PX = 900;
-const NO_WEBGL =
-  "rerun needs WebGL 2, which this browser lacks or has switched off. " +
-  "Save the recording (.rrd) and open it in rerun's own viewer.";
+const NO_WEBGL = `rerun ${NEEDS_WEBGL} Save the recording (.rrd) and open it in rerun's own viewer.`;
 
 /**
  * @param {HTMLElement} body container of the viewer
