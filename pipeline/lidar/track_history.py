@@ -10,6 +10,9 @@ from pipeline.types import F64, I64
 _SIDE_NOISE_M = 0.15
 """Minimum noise of a side: neighbouring rays of a VLP-16 are 0.1 m apart at 28 m, and a rounded corner adds as much."""
 _SURE_SIGMAS = 2.0
+_JUMPS_M, _STAYS_M = 0.5, 0.3
+"""A side jumps if it is farther inside than expected by the first: three times its noise, and at 10 Hz more than the
+body of a vehicle moves sideways. It stays within the second, twice its noise."""
 _NARROW = 3
 """Sightings that may be of one vehicle, out of ten, are enough for its extent: that of a few rays may be too narrow."""
 
@@ -31,6 +34,23 @@ def first_sightings(place: F64, clock_s: float, frames: int) -> F64:
     history: F64 = np.full((len(place), frames, 5), np.nan)
     history[:, -1, 0], history[:, -1, 1:] = clock_s, place
     return history
+
+
+def side_that_stays(expected_y: F64, history: F64, sides: F64) -> F64:
+    """(T,) of each footprint of which a part was cut off: how far its other side is from where it was expected, ego y,
+    m. NaN for the others.
+
+    expected_y: (T,) predicted reference points. history: (T, H, 5) up to the last sighting. sides: (T, 2) the new
+    minimum and maximum ego y. A part is cut off if one side jumps inwards while the other stays: two pedestrians who
+    were one cluster are two again, or the front of a crossing car disappears behind a parked one. The reference point
+    jumps by up to half of that, but nothing has moved.
+
+    A side that jumps outwards may be motion: of a car that appears from behind another one, the front moves first.
+    """
+    low, high = (sides - history[:, -1, 3:5] - (expected_y - history[:, -1, 2])[:, None]).T
+    is_low_cut = (low > _JUMPS_M) & (np.abs(high) <= _STAYS_M)
+    is_high_cut = (high < -_JUMPS_M) & (np.abs(low) <= _STAYS_M)
+    return np.where(is_low_cut, high, np.where(is_high_cut, low, np.nan))
 
 
 def slopes(history: F64) -> F64:

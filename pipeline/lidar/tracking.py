@@ -22,7 +22,7 @@ from scipy.optimize import linear_sum_assignment
 
 from pipeline.common import kalman
 from pipeline.common.geometry import Cuboid
-from pipeline.lidar.track_history import first_sightings, recorded, rigid_sideways, slopes
+from pipeline.lidar.track_history import first_sightings, recorded, rigid_sideways, side_that_stays, slopes
 from pipeline.params import LidarTrackingParams
 from pipeline.types import F64, I64, LidarTrack, Obstacle, Point3
 
@@ -97,6 +97,8 @@ def track(
     expected = filters.mean
     partner = associate(state, filters, seen, dt_s, params)
     jumped = _jumped(filters, seen, partner)
+    if params.cut_off_is_no_motion:
+        filters = _cut_off(filters, state.history, seen, partner)
     filters = _correct(filters, seen.place, partner, params)
     where = np.concatenate([seen.place, seen.sides], axis=1)
     history = recorded(state.history, partner, where, clock_s, max(params.trajectory_frames, _SIDES_FRAMES))
@@ -241,6 +243,20 @@ def _jumped(filters: kalman.CvState, seen: Looks, partner: I64) -> list[bool]:
         return [False] * len(partner)
     away = seen.place[partner] - filters.mean[:, :2]
     return [far and j >= 0 for far, j in zip((np.hypot(*away.T) > _JUMP_M).tolist(), partner.tolist(), strict=True)]
+
+
+def _cut_off(filters: kalman.CvState, history: F64, seen: Looks, partner: I64) -> kalman.CvState:
+    """The predicted filters, where a part of a footprint was cut off with the reference point of what is left: the
+    measurement then tells the motion of the side that stays."""
+    rows = np.flatnonzero(partner >= 0)
+    new = partner[rows]
+    off_m = side_that_stays(filters.mean[rows, 1], history[rows], seen.sides[new])
+    is_cut = ~np.isnan(off_m)
+    if not is_cut.any():
+        return filters
+    mean = filters.mean.copy()
+    mean[rows[is_cut], 1] = seen.place[new[is_cut], 1] - off_m[is_cut]
+    return kalman.CvState(mean, filters.cov)
 
 
 def _correct(filters: kalman.CvState, place: F64, partner: I64, params: LidarTrackingParams) -> kalman.CvState:

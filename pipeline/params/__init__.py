@@ -129,7 +129,7 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "motion": {"source": "can", "keep_over_ground": False},
         "cluster": {"divide_m": 3.0, "divide_tracked": False, "divide_nearer": False},
         "box": {"method": "axis_aligned"},
-        "lidar_tracking": {"filter": "trajectory", "rigid_sideways": False},
+        "lidar_tracking": {"filter": "trajectory", "rigid_sideways": False, "cut_off_is_no_motion": False},
         "detection": {"far_view": False, "car_prior": 1.0},
         "distance": {
             "coefficient": 1829.1,

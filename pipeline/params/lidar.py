@@ -113,3 +113,7 @@ class LidarTrackingParams(Section):
     rigid_sideways: bool = choice(
         True, "An object moves sideways only as far as both of its sides do; off: a growing footprint counts as motion"
     )
+    cut_off_is_no_motion: bool = choice(
+        True,
+        "If a part of a footprint is cut off, its speed follows the side that stays; off: the jump counts as motion",
+    )

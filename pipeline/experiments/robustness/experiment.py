@@ -50,6 +50,7 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "clusters nearer than their track not split": {"cluster.divide_nearer": False},
     "wide clusters taken for vehicles": {"cipv.max_short_side_m": 40.0},
     "growing footprints move sideways": {"lidar_tracking.rigid_sideways": False},
+    "what is cut off moves the rest": {"lidar_tracking.cut_off_is_no_motion": False},
     "ACC acts on one frame": {"acc.confirm_frames": 1},
     "ACC acts on an unknown speed at once": {"acc.speed_hits": 1},
     "no confirmation": {"cipv.confirm_hits": 1},
