@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from math import exp
+from math import exp, log
 from typing import NamedTuple
 
 from pipeline.common.fast_replace import evolve
@@ -31,6 +31,9 @@ _HOVERS_MPS = 1.0
 """A lead with this lateral speed is leaving the path, or crossing it: no hysteresis keeps it."""
 _DRIVES_S = 1.0
 """What was surely moving for this long has driven: a new side that comes into view moves an object for less."""
+_OURS = log(9.0)
+"""Log-odds of being in the path, 90 %, with which a vehicle is surely in our lane. One that never was may drive in the
+next one, seen from a bend that was not foreseen: a lead by 50 to 60 %, it would be kept for as long as it drives."""
 _BOXED_S = 0.5
 """What camera and LiDAR both saw for this long, as a vehicle, is one: a box matches a neighbour's cluster for a few
 sweeps at most (``pipeline.fusion.existence``)."""
@@ -51,6 +54,8 @@ class CipvState:
     """By object id."""
     driving_s: dict[int, float] = field(default_factory=dict)
     """By object id, time for which it was seen to drive."""
+    in_lane_s: dict[int, float] = field(default_factory=dict)
+    """By object id, time for which it was seen to drive in our lane."""
     boxed_s: dict[int, float] = field(default_factory=dict)
     """By object id, time for which both sensors saw it, the camera as a vehicle."""
     rival: Rival | None = None
@@ -79,6 +84,8 @@ class _Judged(NamedTuple):
     """Running mean of its log-odds; None if its position is not known."""
     driving_s: float
     """Time for which it was seen to drive."""
+    in_lane_s: float
+    """Time for which it was seen to drive in our lane."""
     boxed_s: float
     """Time for which both sensors saw it, the camera as a vehicle."""
     why_not: str | None
@@ -111,8 +118,9 @@ def choose(
     odds = {each.item.id: each.odds for each in judged if each.odds is not None}
     at = {each.item.id: last_place(each.item) for each in judged}
     driving_s = {each.item.id: each.driving_s for each in judged if each.driving_s > 0.0}
+    in_lane_s = {each.item.id: each.in_lane_s for each in judged if each.in_lane_s > 0.0}
     boxed_s = {each.item.id: each.boxed_s for each in judged if each.boxed_s > 0.0}
-    return CipvState(lead.id if lead is not None else None, odds, at, driving_s, boxed_s, rival), choice
+    return CipvState(lead.id if lead is not None else None, odds, at, driving_s, in_lane_s, boxed_s, rival), choice
 
 
 def _judge(
@@ -135,16 +143,20 @@ def _judge(
         now = where.log_odds(widening_m, moving_mps * decide_s * _HALF_WAY) if clears_s is None else -SURE
         before = now if moved else state.odds.get(item.id, now)
         odds = before + _fresh(moment.dt_s, decide_s) * (now - before)
-    driving_s, boxed_s = (0.0 if moved else known.get(item.id, 0.0) for known in (state.driving_s, state.boxed_s))
+    driving_s, in_lane_s, boxed_s = (
+        0.0 if moved else known.get(item.id, 0.0) for known in (state.driving_s, state.in_lane_s, state.boxed_s)
+    )
     if item.surely_moving:
         driving_s += moment.dt_s or 0.0
+        if odds is not None and odds >= _OURS:
+            in_lane_s += moment.dt_s or 0.0
     if item.seen_by_camera and item.seen_by_lidar and item.label in VEHICLES:
         boxed_s += moment.dt_s or 0.0
-    has_driven, was_boxed = driving_s >= _DRIVES_S, boxed_s >= _BOXED_S
+    has_driven, was_ours, was_boxed = driving_s >= _DRIVES_S, in_lane_s >= _DRIVES_S, boxed_s >= _BOXED_S
     is_ahead = where is not None and where.ahead_m > 0.0
     probability = 1.0 / (1.0 + exp(-odds)) if is_ahead and odds is not None else 0.0
     verdict = judge(
-        Candidate(item, where, odds or 0.0, leads, widening_m, path, params, clears_s, has_driven, was_boxed)
+        Candidate(item, where, odds or 0.0, leads, widening_m, path, params, clears_s, has_driven, was_ours, was_boxed)
     )
     is_in = is_ahead and verdict.eligibility.in_path
     if clears_s is None and where is not None and where.margin_m() >= 0.0 and is_ahead:
@@ -163,7 +175,7 @@ def _judge(
         crossing_s=crossing_s,
         clears_path_s=clears_s,
     )
-    return _Judged(item, odds, driving_s, boxed_s, verdict.why_not)
+    return _Judged(item, odds, driving_s, in_lane_s, boxed_s, verdict.why_not)
 
 
 def _rejections(judged: list[_Judged], lead: FusedObject | None) -> Iterator[Rejection]:

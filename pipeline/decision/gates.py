@@ -54,6 +54,8 @@ class Candidate(NamedTuple):
     """How long before the car arrives it will have left the path that it crosses; None if it does not."""
     has_driven: bool = False
     """Whether it was seen to drive for long enough that it did not only seem to."""
+    was_ours: bool = False
+    """Whether it was seen to drive in our lane for as long."""
     was_boxed: bool = False
     """Whether both sensors saw it, the camera as a vehicle, for long enough that it is one."""
 
@@ -68,7 +70,7 @@ class Candidate(NamedTuple):
         """With which probability of being in the path it remains the lead. A vehicle that was seen to drive in our lane
         stays in it almost always, but a path without lines or a route may be off by metres at 40 m as a bend begins.
         docs/reference/accuracy.md says on which streets its limit was chosen, and on which it was checked."""
-        keeps_lane = self.has_driven and self.place is not None and self.place.drives_along
+        keeps_lane = self.was_ours and self.place is not None and self.place.drives_along
         return self.params.stay_driving if keeps_lane else self.params.stay_probability
 
     @property
