@@ -67,7 +67,7 @@ class Candidate(NamedTuple):
 
     @property
     def stay_probability(self) -> float:
-        """With which probability of being in the path it remains the lead. A vehicle that was seen to drive in our lane
+        """With which probability of being in the path it remains the lead. A vehicle that surely drove in our lane
         stays in it almost always, but a path without lines or a route may be off by metres at 40 m as a bend begins.
         docs/reference/accuracy.md says on which streets its limit was chosen, and on which it was checked."""
         keeps_lane = self.was_ours and self.place is not None and self.place.drives_along

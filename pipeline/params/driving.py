@@ -223,7 +223,7 @@ class CipvParams(Section):
         0.95,
         0.01,
         "",
-        "A lead that was seen to drive along the path is kept while it is in it with at least this probability: few "
+        "A lead that was seen to drive in our lane is kept while it is in it with at least this probability: few "
         "vehicles leave their lane",
     )
     stay_standing: float = slider(

@@ -126,6 +126,23 @@ def test_a_lead_that_was_seen_to_drive_keeps_its_lane(
     assert (choice.lead is not None) is leads, what
 
 
+@pytest.mark.parametrize(
+    ("offset_m", "stays"), [(0.0, True), (1.3, False)], ids=["it was in our lane", "it may have been in the next one"]
+)
+def test_a_lead_keeps_only_a_lane_that_surely_was_ours(offset_m: float, stays: bool) -> None:
+    """Followed for two seconds on a path known to a metre, it is then 3.5 m beside one known to five."""
+    ego, state, leads, probable = EgoState(0, 12.0, 0.0), CipvState(), [], []
+    for k in range(40):
+        item = dataclasses.replace(fused(1, 40.0, offset_m if k < 20 else 3.5, velocity=(0.0, 0.0)), ranged_steady=20)
+        path = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), 1.0 if k < 20 else 5.0))
+        state, choice = choose(state, describe([item], ego, MotionParams()), path, moment(ego, 0.1), PARAMS)
+        leads.append(choice.lead is not None)
+        probable.append(choice.objects[0].in_path_probability or 0.0)
+    assert all(leads[3:20]), "it leads in either case"
+    assert (max(probable) > 0.9) is stays
+    assert leads[-1] is stays
+
+
 def test_what_crosses_fast_is_judged_where_it_is_now() -> None:
     """A car crosses from the right at 6 m/s: it leads from the first frame on in which 0.9 m of it, its nose included,
     are inside, and not in the first in which they are not. One that is there at a
