@@ -13,6 +13,8 @@ _SURE_SIGMAS = 2.0
 _JUMPS_M, _STAYS_M = 0.5, 0.3
 """A side jumps if it is farther inside than expected by the first: three times its noise, and at 10 Hz more than the
 body of a vehicle moves sideways. It stays within the second, twice its noise."""
+_LASTS = 3
+"""Sightings for which a part was there, so that its own appearance is no longer in the track's speed."""
 _NARROW = 3
 """Sightings that may be of one vehicle, out of ten, are enough for its extent: that of a few rays may be too narrow."""
 
@@ -36,21 +38,24 @@ def first_sightings(place: F64, clock_s: float, frames: int) -> F64:
     return history
 
 
-def side_that_stays(expected_y: F64, history: F64, sides: F64) -> F64:
+def side_that_stays(history: F64, lateral_mps: F64, now_s: float, sides: F64) -> F64:
     """(T,) of each footprint of which a part was cut off: how far its other side is from where it was expected, ego y,
     m. NaN for the others.
 
-    expected_y: (T,) predicted reference points. history: (T, H, 5) up to the last sighting. sides: (T, 2) the new
-    minimum and maximum ego y. A part is cut off if one side jumps inwards while the other stays: two pedestrians who
-    were one cluster are two again, or the front of a crossing car disappears behind a parked one. The reference point
-    jumps by up to half of that, but nothing has moved.
+    history: (T, H, 5) up to the last sighting. lateral_mps: (T,) speeds along ego y. sides: (T, 2) the new minimum and
+    maximum ego y. A part is cut off if one side jumps inwards of where the last three sightings had it, while the other
+    stays: two pedestrians who were one cluster are two again, or the front of a crossing car disappears behind a parked
+    one. The reference point jumps by up to half of that, but nothing has moved.
 
-    A side that jumps outwards may be motion: of a car that appears from behind another one, the front moves first.
+    A side that jumps outwards may be motion: of a car that appears from behind another one, the front moves first. If
+    it jumps back at once, as a hedge's does, the one jump makes up for the other.
     """
-    low, high = (sides - history[:, -1, 3:5] - (expected_y - history[:, -1, 2])[:, None]).T
-    is_low_cut = (low > _JUMPS_M) & (np.abs(high) <= _STAYS_M)
-    is_high_cut = (high < -_JUMPS_M) & (np.abs(low) <= _STAYS_M)
-    return np.where(is_low_cut, high, np.where(is_high_cut, low, np.nan))
+    last = history[:, -_LASTS:]
+    expected = last[:, :, 3:] + (lateral_mps[:, None] * (now_s - last[:, :, 0]))[:, :, None]
+    low_m, high_m = (sides - expected[:, -1]).T
+    is_low_cut = (sides[:, 0] - expected[:, :, 0].max(axis=1) > _JUMPS_M) & (np.abs(high_m) <= _STAYS_M)
+    is_high_cut = (expected[:, :, 1].min(axis=1) - sides[:, 1] > _JUMPS_M) & (np.abs(low_m) <= _STAYS_M)
+    return np.where(is_low_cut, high_m, np.where(is_high_cut, low_m, np.nan))
 
 
 def slopes(history: F64) -> F64:

@@ -98,7 +98,7 @@ def track(
     partner = associate(state, filters, seen, dt_s, params)
     jumped = _jumped(filters, seen, partner)
     if params.cut_off_is_no_motion:
-        filters = _cut_off(filters, state.history, seen, partner)
+        filters = _cut_off(filters, state.history, clock_s, seen, partner)
     filters = _correct(filters, seen.place, partner, params)
     where = np.concatenate([seen.place, seen.sides], axis=1)
     history = recorded(state.history, partner, where, clock_s, max(params.trajectory_frames, _SIDES_FRAMES))
@@ -245,12 +245,12 @@ def _jumped(filters: kalman.CvState, seen: Looks, partner: I64) -> list[bool]:
     return [far and j >= 0 for far, j in zip((np.hypot(*away.T) > _JUMP_M).tolist(), partner.tolist(), strict=True)]
 
 
-def _cut_off(filters: kalman.CvState, history: F64, seen: Looks, partner: I64) -> kalman.CvState:
+def _cut_off(filters: kalman.CvState, history: F64, now_s: float, seen: Looks, partner: I64) -> kalman.CvState:
     """The predicted filters, where a part of a footprint was cut off with the reference point of what is left: the
     measurement then tells the motion of the side that stays."""
     rows = np.flatnonzero(partner >= 0)
     new = partner[rows]
-    off_m = side_that_stays(filters.mean[rows, 1], history[rows], seen.sides[new])
+    off_m = side_that_stays(history[rows], filters.mean[rows, 3], now_s, seen.sides[new])
     is_cut = ~np.isnan(off_m)
     if not is_cut.any():
         return filters
