@@ -246,8 +246,8 @@ def _jumped(filters: kalman.CvState, seen: Looks, partner: I64) -> list[bool]:
 
 
 def _cut_off(filters: kalman.CvState, history: F64, now_s: float, seen: Looks, partner: I64) -> kalman.CvState:
-    """The predicted filters, where a part of a footprint was cut off with the reference point of what is left: the
-    measurement then tells the motion of the side that stays."""
+    """The predicted filters. Where a part of a footprint was cut off, they expect the reference point of what is left,
+    so that its measurement tells the motion of the side that stays."""
     rows = np.flatnonzero(partner >= 0)
     new = partner[rows]
     off_m = side_that_stays(history[rows], filters.mean[rows, 3], now_s, seen.sides[new])

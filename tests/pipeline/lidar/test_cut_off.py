@@ -55,6 +55,13 @@ def test_a_crossing_cars_front_that_appears_is_motion() -> None:
     assert sideways(appears)[-1] > 3.0
 
 
+def test_what_appears_for_one_sweep_makes_up_for_itself() -> None:
+    """As twigs of a hedge do: both jumps count, so that no speed remains."""
+    seen = [(-6.0, -4.0)] * 6 + [(-6.0, -3.0)] + [(-6.0, -4.0)] * 5
+    assert sideways(seen) == sideways(seen, TOGETHER)
+    assert abs(sideways(seen)[-1]) < 0.3
+
+
 def test_what_moves_as_a_whole_is_as_fast_as_before() -> None:
     steps = [(0.17 * k * k / 10, 1.8 + 0.17 * k * k / 10) for k in range(12)]
     assert sideways(steps) == sideways(steps, TOGETHER)
