@@ -75,9 +75,15 @@ def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None, params: Ae
         return params.react_to_crossing and item.label in _ON_FOOT and _steps_in(item, path)
     toward = max(-sideways if item.path_offset_m > 0 else sideways, 0.0)
     aside_m = abs(item.path_offset_m) - toward * item.ttc_s
-    if aside_m + (_SURE_SIGMAS * sigma_m if oncoming else 0.0) <= path.half_width_m:
+    if aside_m + (_SURE_SIGMAS * sigma_m if oncoming else 0.0) <= _reach_m(item, path):
         return True
     return params.react_to_crossing and not oncoming and _surely_drives_in(item, toward, item.ttc_s)
+
+
+def _reach_m(item: FusedObject, path: Path) -> float:
+    """How far from the middle of the path an object that comes in is in the way: to its edge; a person, of whom little
+    is beside their middle, only before the car itself."""
+    return min(OWN_HALF_WIDTH_M + _HALF_A_PERSON_M, path.half_width_m) if item.label == "person" else path.half_width_m
 
 
 def _steps_in(item: FusedObject, path: Path) -> bool:

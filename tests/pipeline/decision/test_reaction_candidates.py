@@ -129,6 +129,23 @@ def test_a_person_steps_in(item: FusedObject, enters: bool) -> None:
 
 
 @pytest.mark.parametrize(
+    ("item", "enters"),
+    [
+        pytest.param(walker(-3.2, 3.0), True, id="a person who will be before the car"),
+        pytest.param(walker(-3.5, 3.0), False, id="a person who will be beside its side"),
+        pytest.param(walker(3.5, -3.0), False, id="the same from the left"),
+        pytest.param(walker(-3.5, 3.0, "car"), True, id="a vehicle, which is wider, in the path"),
+    ],
+)
+def test_a_person_is_met_before_the_car_only(item: FusedObject, enters: bool) -> None:
+    """In 0.86 s, by 2.5 m/s, as much as surely is no noise, the first is 1.0 m and the others 1.35 m from the middle of
+    a path that is 1.5 m wide on either side."""
+    known = judged(item, 13.9)
+    assert known.surely_moving
+    assert enters_corridor(known, PATH, None, AebParams()) is enters
+
+
+@pytest.mark.parametrize(
     ("then_m", "params", "enters"),
     [
         pytest.param(0.9, AebParams(), True, id="inside"),
