@@ -6,7 +6,7 @@ const menu = $("#menu");
 /** @type {HTMLElement|null} */
 let owner = null;
 
-// what the server says of an entry comes after it is shown
+// entries that the server must be asked for come after it is shown
 new ResizeObserver(() => owner && menu.matches(":popover-open") && place(owner)).observe(menu);
 
 /**

@@ -66,7 +66,7 @@ def test_it_is_legible_and_fits(open_page: OpenPage, site: Site, width: int, hei
         assert box["y"] + box["height"] <= height, part
     page.locator(EXPORT).click()
     menu = page.locator("#menu")
-    expect(menu.locator(".losses li").first).to_be_attached()  # what a format loses comes after the menu is shown
+    expect(menu.locator(".losses li").first).to_be_attached()  # the entries come after the menu is shown
     settle(page)
     box = box_of(menu)
     assert box["x"] + box["width"] <= width

@@ -38,11 +38,8 @@ export function exportButton() {
     aria: { haspopup: "menu" },
     title: "Export labels to a file",
   });
-  attachMenu(button, "Export labels", () => {
-    const rows = () => exportRows(() => refill(button, rows));
-    if (!formats.length) listFormats().then(() => refill(button, rows));
-    return rows();
-  });
+  const rows = () => exportRows(() => refill(button, rows));
+  attachMenu(button, "Export labels", rows);
   return button;
 }
 
@@ -69,32 +66,49 @@ function exportRows(again) {
     press(choice, only === key);
     return choice;
   });
-  const links = formats.map(({ name, title, about }) => {
-    const link = el(
-      "a",
-      { class: "item", href: `api/labels/export?format=${name}&version=working&only=${only}` },
-      el("b", { textContent: title }),
-      el("span", { class: "facts", textContent: about }),
-    );
-    link.setAttribute("download", "");
-    tellLoss(name, link);
-    return link;
-  });
   const which = el("div", { class: "list-bar" }, el("div", { class: "joined" }, ...choices));
-  const suspicious = el("button", { type: "button", class: "quiet", hidden: true, onclick: goToChecks });
-  tellProblems(suspicious);
-  return [el("h3", { textContent: "Export labels" }), which, suspicious, ...links];
+  const entries = el("div", {}, el("p", { class: "facts pad", textContent: "Checking what each format loses …" }));
+  fillEntries(entries);
+  return [el("h3", { textContent: "Export labels" }), which, entries];
+}
+
+/** Fill in all entries at once: one that came later would move the others under the pointer.
+ * @param {HTMLElement} entries */
+async function fillEntries(entries) {
+  if (!formats.length) await listFormats();
+  if (!formats.length) {
+    const words = "No answer from the server. Open this menu again.";
+    return entries.replaceChildren(el("p", { class: "facts pad", textContent: words }));
+  }
+  const asked = Promise.all(formats.map(({ name }) => lossesOf(name)));
+  const [problems, losses] = await Promise.all([countProblems(), asked]);
+  const words = `⚠ ${problems} to check first`;
+  const suspicious = el("button", { type: "button", class: "quiet", textContent: words, onclick: goToChecks });
+  const links = formats.flatMap((format, k) => linkTo(format, losses[k]));
+  entries.replaceChildren(...(problems ? [suspicious] : []), ...links);
+}
+
+/** The download link of a format, and what it loses. @param {Format} format @param {string[]} lost */
+function linkTo({ name, title, about }, lost) {
+  const link = el(
+    "a",
+    { class: "item", href: `api/labels/export?format=${name}&version=working&only=${only}`, title: lost.join("\n") },
+    el("b", { textContent: title }),
+    el("span", { class: "facts", textContent: about }),
+  );
+  link.setAttribute("download", "");
+  if (!lost.length) return [link];
+  link.append(el("span", { class: "loses", textContent: `loses ${lost.length}` }));
+  return [link, el("ul", { class: "losses facts" }, ...lost.map((words) => el("li", { textContent: words })))];
 }
 
 const goToChecks = () => $("#tab-label-checks").click();
 
-/** What the checks have found is said before anything is exported. @param {HTMLElement} node */
-async function tellProblems(node) {
+/** How many problems the checks have found: said before anything is exported. @returns {Promise<number>} */
+async function countProblems() {
   /** @type {{problems: unknown[]}|null} */
   const found = await request("api/labels/checks").catch(() => null);
-  if (!found?.problems.length) return;
-  node.hidden = false;
-  text(node, `⚠ ${found.problems.length} to check first`);
+  return found?.problems.length ?? 0;
 }
 
 /** Ask the server which formats it reads and writes; without an answer the next look asks again. */
@@ -103,16 +117,13 @@ async function listFormats() {
   which.replaceChildren(...formats.map(({ name, title }) => el("option", { value: name, textContent: title })));
 }
 
-/** @param {string} key @param {HTMLElement} node */
-async function tellLoss(key, node) {
+/** What a format cannot hold. @param {string} key @returns {Promise<string[]>} */
+async function lossesOf(key) {
   /** @type {{lost: string[]}} */
   const { lost } = await request(`api/labels/export/notes?format=${key}&only=${only}`).catch((error) => ({
     lost: [error.message],
   }));
-  if (!lost.length) return;
-  node.title = lost.join("\n");
-  node.append(el("span", { class: "loses", textContent: `loses ${lost.length}` }));
-  node.after(el("ul", { class: "losses facts" }, ...lost.map((words) => el("li", { textContent: words }))));
+  return lost;
 }
 
 /** @param {HTMLElement} parent */
