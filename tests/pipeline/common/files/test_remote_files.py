@@ -118,6 +118,36 @@ class _WebServer(BaseHTTPRequestHandler):
         pass
 
 
+class _WholeFiles(_WebServer):
+    """Ignores which part of a file is requested, as Python's own http.server does."""
+
+    def do_GET(self) -> None:
+        self.send_response(200)
+        self.send_header("Content-Length", "700000")
+        self.end_headers()
+        self.wfile.write(bytes(700_000 if self.command == "GET" else 0))
+
+    do_HEAD = do_GET
+
+
+def test_a_web_server_that_sends_only_whole_files_is_told_at_once(monkeypatch: pytest.MonkeyPatch):
+    """It would do so at every further try, too."""
+    monkeypatch.setattr(remote_files.time, "sleep", lambda _: pytest.fail("tried again"))
+    server = ThreadingHTTPServer(("127.0.0.1", 0), _WholeFiles)
+    thread = Thread(target=server.serve_forever)
+    thread.start()
+    address = f"http://127.0.0.1:{server.server_port}/a.mcap"
+    try:
+        file = remote_files.open_remote(address)
+        file.seek(300_000)
+        with pytest.raises(NotReachable, match="sends whole files"):
+            file.read(10)
+    finally:
+        server.shutdown()
+        thread.join()
+        server.server_close()
+
+
 def test_a_web_server_that_fails_does_not_say_that_a_file_is_not_there(in_no_time):
     """A batch sets what is not there aside for good, and tries what failed again."""
     server = ThreadingHTTPServer(("127.0.0.1", 0), _WebServer)
