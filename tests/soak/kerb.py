@@ -19,8 +19,8 @@ from pipeline.simulation.closed_loop import Setup, drive
 from pipeline.warm_up import warm_up
 
 LANE_M, MEETS_S = 3.5, 8.0
-WALKS_S, SLOWS_S = 3.0, 0.3
-"""How long they walk before they stop, and within which time they stop."""
+WALKS_S, SLOWS_S = 3.0, 1.0
+"""How long they walk before they stop, and within which time they stop: two steps, the fastest that is usual."""
 STOPS_M = (1.3, 1.6, 1.9, 2.3, 2.8, 3.5)
 """Distance from the middle of the path at which they stop; the lane ends at 1.75 m, the car at 0.9 m."""
 SPEEDS = {"walks at 1.4 m/s": 1.4, "runs at 2.5 m/s": 2.5}

@@ -30,8 +30,10 @@ _WALKS_S = (5.0, 2.0)
 road bends."""
 _BEFORE_S, _APPROACH_S = (0.5, 4.0), (1.0, 2.5)
 """How long before the car passes they reach the kerb, and how long they walk there."""
-_STARTS_S, _STOPS_S = 0.05, 0.4
-"""The latter within a step: nothing shows earlier that they will stop."""
+_STARTS_S, _STOPS_S = 0.05, 1.0
+"""The latter is two steps; nothing shows earlier that they will stop. At urban intersections, even those who stop fast
+take two to three, and most take six (Goldhammer et al., Analysis on termination of pedestrians' gait at urban
+intersections, ITSC 2014)."""
 _PARKED_M, _CROSSING_M = 4.0, 12.0
 """Nobody waits nearer to the middle of a parked car, or stands nearer to a crossing."""
 
