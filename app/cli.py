@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import ast
 import os
+import platform
 import sys
 from collections.abc import Callable
 from importlib import import_module
+from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -99,13 +101,22 @@ def _parse(arguments: list[str]) -> Callable[[], int]:
         if name in COMMANDS:
             with _PATHS:
                 return tyro.cli(_command(name), args=arguments[words:], prog=f"cipv {name}", config=_CONFIG)
+    if arguments[:1] == ["--version"]:
+        return _show_version
     return tyro.extras.subcommand_cli_from_dict(
         {name: _stand_in(name) for name in COMMANDS if " " not in name},
         args=arguments,
         prog="cipv",
-        description="CIPV Studio: which vehicle ahead is the closest one in my path, how far, how fast, and why.",
+        description="CIPV Studio: which vehicle ahead is the closest one in my path, how far, how fast, and why. "
+        "cipv --version names what is installed.",
         config=_CONFIG,
     )
+
+
+def _show_version() -> int:
+    """What a report of a problem should begin with."""
+    print(f"CIPV Studio {version('cipv-studio')}, Python {platform.python_version()}, {platform.platform(terse=True)}")
+    return 0
 
 
 @_PATHS.primitive_rule

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -36,3 +37,12 @@ def test_an_unknown_home_directory_is_one_line(
 def test_the_command_line_can_be_started_as_a_module() -> None:
     ran = subprocess.run([sys.executable, "-m", "app.cli", "params"], capture_output=True, text=True, check=True)
     assert "cluster.z_weight" in ran.stdout
+
+
+def test_the_version_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--version"])
+    assert ended.value.code == 0
+    said = capsys.readouterr().out
+    assert said.startswith(f"CIPV Studio {version('cipv-studio')}, Python 3.")
+    assert said.count("\n") == 1

@@ -126,7 +126,7 @@ def _cli_lines() -> Iterator[str]:
         "",
         _MADE,
         "",
-        "`cipv COMMAND --help` prints the same. `make install` puts the program at `.venv/bin/cipv`.",
+        "`cipv COMMAND --help` prints the same; `cipv --version` names the version, which a report of a problem should\nbegin with. `make install` puts the program at `.venv/bin/cipv`.",
         "",
         "The exit status is 0 for success, 1 for failure, and 2 for bad usage or bad input. An error is one line on",
         "standard error; set `CIPV_DEBUG=1` for the traceback of an unexpected one. Results go to standard output,",
