@@ -37,7 +37,7 @@ def exists(words: list[str]) -> bool:
     names = {*commands(), *COMMANDS}
     name = next((typed for n in (2, 1) if (typed := " ".join(words[:n])) in names), None)
     if name is None:
-        return False
+        return words == ["--version"] and callable(_parse(words))
     known = {option for action in parser_of(name)._actions for option in action.option_strings}
     return all(word.partition("=")[0] in known for word in words if word.startswith("--"))
 
