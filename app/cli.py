@@ -8,7 +8,7 @@ import platform
 import sys
 from collections.abc import Callable
 from importlib import import_module
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -108,14 +108,18 @@ def _parse(arguments: list[str]) -> Callable[[], int]:
         args=arguments,
         prog="cipv",
         description="CIPV Studio: which vehicle ahead is the closest one in my path, how far, how fast, and why. "
-        "cipv --version names what is installed.",
+        "cipv --version prints the version.",
         config=_CONFIG,
     )
 
 
 def _show_version() -> int:
     """What a report of a problem should begin with."""
-    print(f"CIPV Studio {version('cipv-studio')}, Python {platform.python_version()}, {platform.platform(terse=True)}")
+    try:
+        number = version("cipv-studio")
+    except PackageNotFoundError:
+        number = "not installed"
+    print(f"CIPV Studio {number}, Python {platform.python_version()}, {platform.platform(terse=True)}")
     return 0
 
 
