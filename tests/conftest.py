@@ -8,9 +8,11 @@ import signal
 import tempfile
 from collections.abc import Generator
 from contextlib import suppress
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 
+import httpx
 import pytest
 from hypothesis import settings
 from xdist.remote import Producer
@@ -31,6 +33,10 @@ os.environ["CIPV_LABELS_URL"] = f"sqlite:///{_LABELS.name}/labels.db"
 # Tests talk to servers of their own on this machine, which a company's proxy does not know.
 for _variable in [name for name in os.environ if name.lower() in ("http_proxy", "https_proxy", "all_proxy")]:
     del os.environ[_variable]
+
+# A client reads the certificates of all authorities when it is made, which takes 25 ms. Those of tests share them; the
+# few that talk TLS bring their own.
+httpx._transports.default.create_ssl_context = cache(httpx.create_ssl_context)
 
 ROOT = Path(__file__).resolve().parent.parent
 _TOGETHER = ("accuracy",)
