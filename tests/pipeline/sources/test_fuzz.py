@@ -42,6 +42,8 @@ def images_and_track(folder: Path) -> Path:
 
 
 two_of_nuscenes = partial(write_nuscenes, frames=2)
+until_it_stands = partial(write_kitti360, frames=6)
+three_of_radiate = partial(write_radiate, frames=3)
 FILES = {
     "astyx lidar": (write_astyx, "astyx:{folder}", "lidar_vlp16/000002.txt"),
     "astyx image": (write_astyx, "astyx:{folder}", "camera_front/000002.jpg"),
@@ -56,9 +58,9 @@ FILES = {
     "kitti stamps": (write_kitti_raw, "kitti:{folder}", "velodyne_points/timestamps.txt"),
     "kitti raw cameras": (write_kitti_raw, "kitti:{folder}", "../calib_cam_to_cam.txt"),
     "kitti raw velodyne": (write_kitti_raw, "kitti:{folder}", "../calib_velo_to_cam.txt"),
-    "kitti-360 poses": (write_kitti360, "kitti:{folder}", f"data_poses/{DRIVE}/cam0_to_world.txt"),
-    "kitti-360 velodyne": (write_kitti360, "kitti:{folder}", "calibration/calib_cam_to_velo.txt"),
-    "kitti-360 cameras": (write_kitti360, "kitti:{folder}", "calibration/perspective.txt"),
+    "kitti-360 poses": (until_it_stands, "kitti:{folder}", f"data_poses/{DRIVE}/cam0_to_world.txt"),
+    "kitti-360 velodyne": (until_it_stands, "kitti:{folder}", "calibration/calib_cam_to_velo.txt"),
+    "kitti-360 cameras": (until_it_stands, "kitti:{folder}", "calibration/perspective.txt"),
     "pcap": (write_capture, "pcap:{folder}/drive.pcap", "drive.pcap"),
     "video": (write_capture, "pcap:{folder}/drive.pcap", "drive.avi"),
     "sentences": (write_capture, "pcap:{folder}/drive.pcap", "drive.nmea"),
@@ -77,9 +79,9 @@ FILES = {
     "nuscenes sensors": (two_of_nuscenes, "nuscenes:{folder}", "v1.0-mini/calibrated_sensor.json"),
     "nuscenes poses": (two_of_nuscenes, "nuscenes:{folder}", "v1.0-mini/ego_pose.json"),
     "nuscenes boxes": (two_of_nuscenes, "nuscenes:{folder}", "v1.0-mini/sample_annotation.json"),
-    "radiate sweep": (write_radiate, "radiate:{folder}", "velo_lidar/000002.csv"),
-    "radiate times": (write_radiate, "radiate:{folder}", "velo_lidar.txt"),
-    "radiate state": (write_radiate, "radiate:{folder}", "GPS_IMU_Twist/000002.txt"),
+    "radiate sweep": (three_of_radiate, "radiate:{folder}", "velo_lidar/000002.csv"),
+    "radiate times": (three_of_radiate, "radiate:{folder}", "velo_lidar.txt"),
+    "radiate state": (three_of_radiate, "radiate:{folder}", "GPS_IMU_Twist/000002.txt"),
     "first of images": (images_and_track, "pictures:{folder}", "0.png"),
     "track of images": (images_and_track, "pictures:{folder}", "track.gpx"),
     "rosbag 1": (partial(small_bag, kind="ros1"), "rosbag:{folder}/drive.bag", "drive.bag"),

@@ -41,7 +41,7 @@ def state(north: float = NORTH_MPS, east: float = EAST_MPS, down: float = DOWN_R
     )
 
 
-def write_radiate(folder: Path, first: int = 1, indexed_from: int = 1) -> Path:
+def write_radiate(folder: Path, first: int = 1, indexed_from: int = 1, frames: int = COUNT) -> Path:
     """Sweeps at 10 Hz, images 20 ms after each, states 10 ms before. first: number of the first files; indexed_from:
     number of the first frame in the indices."""
     for name, suffix, late_ns in (
@@ -51,7 +51,7 @@ def write_radiate(folder: Path, first: int = 1, indexed_from: int = 1) -> Path:
     ):
         (folder / name).mkdir(parents=True)
         lines = []
-        for k in range(COUNT):
+        for k in range(frames):
             path, t_ns = folder / name / f"{first + k:06d}.{suffix}", START_NS + k * 100_000_000 + late_ns
             if suffix == "png":
                 cv2.imwrite(str(path), np.full((376, 672, 3), 10 * k, np.uint8))

@@ -34,7 +34,7 @@ def T_rect_ego() -> np.ndarray:
     return rectify @ inverse(T_ego_cam)
 
 
-def write_kitti360(root: Path, drive: str = DRIVE) -> Path:
+def write_kitti360(root: Path, drive: str = DRIVE, frames: int = FRAMES) -> Path:
     """Frames at 10 Hz of a car on an arc, without poses while it stands."""
     velodyne, camera = root / "data_3d_raw" / drive / "velodyne_points", root / "data_2d_raw" / drive / "image_00"
     for folder in (velodyne / "data", camera / "data_rect", root / "data_poses" / drive):
@@ -42,9 +42,9 @@ def write_kitti360(root: Path, drive: str = DRIVE) -> Path:
     (root / "calibration").mkdir(exist_ok=True)
     (root / "calibration" / "calib_cam_to_velo.txt").write_text(CAM_TO_VELO + "\n")
     (root / "calibration" / "perspective.txt").write_text(PERSPECTIVE)
-    stamps = [f"2013-05-28 08:46:{k // 10:02d}.{k % 10}00000000\n" for k in range(FRAMES)]
+    stamps = [f"2013-05-28 08:46:{k // 10:02d}.{k % 10}00000000\n" for k in range(frames)]
     poses, driven_s = [], 0.0
-    for k in range(FRAMES):
+    for k in range(frames):
         (velodyne / "data" / f"{k:010d}.bin").write_bytes(rings_file())
         cv2.imwrite(str(camera / "data_rect" / f"{k:010d}.png"), np.full((376, 1408, 3), 20 * k, np.uint8))
         if k and not STANDS_FROM < k <= STANDS_TO:
