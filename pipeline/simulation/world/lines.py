@@ -6,6 +6,7 @@ counter-clockwise from x. Beyond its ends, a line continues as its first and las
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 
 import numpy as np
@@ -32,6 +33,9 @@ class RoadLine:
             poses.append((x + along * c - sideways * s, y + along * s + sideways * c, heading + turned))
         self._x, self._y, self._heading = np.array(poses).T.copy()
         self._c, self._s = np.cos(self._heading), np.sin(self._heading)
+        columns = self._starts, self._curvature, self._x, self._y, self._heading, self._c, self._s
+        self._arcs: list[tuple[float, ...]] = np.column_stack(columns).tolist()
+        self._arc_starts: list[float] = self._starts.tolist()
         self.straight = not np.any(self._curvature)
         """Whether it does not bend."""
         self._outer = np.concatenate([[-_LONG_M], self._starts[1:], [float(lengths.sum()) + _LONG_M]])
@@ -39,6 +43,8 @@ class RoadLine:
 
     def to_world(self, s_m: npt.ArrayLike, d_m: npt.ArrayLike) -> F64:
         """(N, 3) x, y, heading of positions (s, d), each (N,) or a number."""
+        if isinstance(s_m, float) and isinstance(d_m, float):
+            return np.array([self._pose(s_m, d_m)])
         s, d = np.asarray(s_m, dtype=np.float64), np.asarray(d_m, dtype=np.float64)
         if s.ndim == 0:  # written out, as broadcasting takes as long as the rest
             s = np.full(d.shape or (1,), s)
@@ -51,6 +57,21 @@ class RoadLine:
         found[:, 0] = self._x[index] + along * c0 - sideways * s0 - d * np.sin(heading)
         found[:, 1] = self._y[index] + along * s0 + sideways * c0 + d * np.cos(heading)
         return found
+
+    def _pose(self, s_m: float, d_m: float) -> WorldPose:
+        """``to_world`` of one position, to the last bit: with arrays, a number takes ten times as long."""
+        start, curvature, x, y, heading, c, s = self._arcs[max(bisect_right(self._arc_starts, s_m) - 1, 0)]
+        along, sideways = float(s_m) - start, 0.0
+        if not self.straight:
+            length, turned = along, curvature * along
+            along = length * _sinc(turned / np.pi)
+            sideways = length * float(np.sin(turned / 2)) * _sinc(turned / (2 * np.pi))
+            heading += turned
+        return (
+            x + along * c - sideways * s - d_m * float(np.sin(heading)),
+            y + along * s + sideways * c + d_m * float(np.cos(heading)),
+            heading,
+        )
 
     def advance(self, s_m: float, way_m: float, d_m: float) -> float:
         """The s reached from ``s_m`` by driving ``way_m`` (negative: against the line) at constant d: in a bend the
@@ -82,3 +103,9 @@ def _arc(length_m: F64, curvature_per_m: F64) -> tuple[F64, F64, F64]:
     along = length_m * np.sinc(turned / np.pi)
     sideways = length_m * np.sin(turned / 2) * np.sinc(turned / (2 * np.pi))
     return along, sideways, turned
+
+
+def _sinc(x: float) -> float:
+    """``np.sinc`` of one number."""
+    y = np.pi * x
+    return float(np.sin(y)) / y if y else 1.0

@@ -7,6 +7,7 @@ line, metres to its left. World: x, y metres, heading counter-clockwise from x; 
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Mapping
 from functools import cached_property
 from itertools import pairwise
@@ -244,13 +245,19 @@ class Road(ScenarioPart):
 
     def curvature_per_m(self, s_m: float) -> float:
         """Curvature of the reference line at s; the first and last segment continue indefinitely."""
-        ends = np.cumsum([segment.length_m for segment in self.segments])
-        index = min(int(np.searchsorted(ends, s_m, side="right")), len(ends) - 1)
+        ends = self.segment_ends_m
+        index = min(bisect_right(ends, s_m), len(ends) - 1)
         segment = self.segments[index]
         if segment.end_curvature_per_m is None:
             return segment.curvature_per_m
         share = min(max(1.0 - (ends[index] - s_m) / segment.length_m, 0.0), 1.0)
         return segment.curvature_per_m + float(share) * (segment.end_curvature_per_m - segment.curvature_per_m)
+
+    @cached_property
+    def segment_ends_m(self) -> list[float]:
+        """The s at which each segment ends."""
+        ends_m: list[float] = np.cumsum([segment.length_m for segment in self.segments]).tolist()
+        return ends_m
 
     def to_world(self, s_m: npt.ArrayLike, d_m: npt.ArrayLike) -> F64:
         """(N, 3) x, y, heading of positions (s, d), each (N,) or a number."""

@@ -42,6 +42,20 @@ def test_roads_have_no_steps_or_kinks(parts: list[tuple[float, float]], s: float
     assert np.hypot(*(across[1] - across[0])[:2]) == pytest.approx(2.0)
 
 
+@given(
+    st.lists(st.tuples(st.floats(5, 300), st.sampled_from([0.0, 1e-9, 0.01, -0.05])), min_size=1, max_size=5),
+    st.lists(st.tuples(st.floats(-100, 900), st.floats(-9, 9)), min_size=1),
+)
+def test_a_place_is_the_same_alone_and_among_others(
+    parts: list[tuple[float, float]], places: list[tuple[float, float]]
+):
+    road = Road(segments=tuple(Segment(length_m=length, curvature_per_m=bend) for length, bend in parts))
+    places += [(0.0, -0.0), *((end_m, 0.0) for end_m in road.segment_ends_m)]
+    among = road.to_world(*np.array(places).T)
+    alone = np.concatenate([road.to_world(s, d) for s, d in places])
+    assert alone.tobytes() == among.tobytes()
+
+
 def test_lanes_are_counted_from_the_median() -> None:
     assert ROAD.lane_offset_m(-1) == pytest.approx(-2.0 - 1.8)
     assert ROAD.lane_offset_m(-3) == pytest.approx(-2.0 - 2.5 * 3.6)
