@@ -74,8 +74,19 @@ def folder(data_dir: Path) -> Path:
 
 
 @cache
+def outcome(path: str) -> Scenario | ScenarioError:
+    """The scenario, or why it does not open; many tests ask for the same ones."""
+    try:
+        return scenario.load(path)
+    except ScenarioError as error:
+        return error
+
+
 def load(path: str) -> Scenario:
-    return scenario.load(path)
+    made = outcome(path)
+    if isinstance(made, ScenarioError):
+        raise made.with_traceback(None)
+    return made
 
 
 def refusal(path: Path) -> str | None:
