@@ -110,7 +110,8 @@ def packed(method: int = zipfile.ZIP_DEFLATED, **files: str) -> bytes:
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w", method) as made:
         for name, text in files.items():
-            made.writestr(name.replace("__", "/"), text)
+            # With a fixed date: the bytes are part of tests' names, which must be the same in every process
+            made.writestr(zipfile.ZipInfo(name.replace("__", "/")), text, method)
     return out.getvalue()
 
 
