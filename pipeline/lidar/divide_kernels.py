@@ -19,8 +19,8 @@ OUTSIDE = -2
 
 @numba.njit(cache=True, nogil=True)
 def reach_clusters(points: F32, labels: I32, footprints: F64, clusters: int) -> tuple[Mask, F64, F64]:
-    """(T, C) bool: the clusters whose bounds along ego x and y are near each footprint's bounds, and (C,) the extent of
-    the clusters along ego y and their lowest ego x, m."""
+    """(T, C) bool: the clusters whose bounds along ego x and y are near each footprint's bounds; and (C, 2) these
+    bounds, lowest and highest x and y, m."""
     low, high = np.full((clusters, 2), np.inf), np.full((clusters, 2), -np.inf)
     for i in range(len(points)):
         if labels[i] >= 0:
@@ -35,7 +35,7 @@ def reach_clusters(points: F32, labels: I32, footprints: F64, clusters: int) -> 
             outside_x = max(low[c, 0] - x, x - high[c, 0]) - along
             outside_y = max(low[c, 1] - y, y - high[c, 1]) - across
             reached[t, c] = max(outside_x, outside_y) <= AROUND_M
-    return reached, high[:, 1] - low[:, 1], low[:, 0]
+    return reached, low, high
 
 
 @numba.njit(cache=True, nogil=True)
@@ -88,7 +88,83 @@ def count_seeds(labels: I32, owner: I32, tracks: int, clusters: int) -> I32:
 
 
 @numba.njit(cache=True, nogil=True)
-def join(points: F32, seeds: I32, z_weight: float) -> I32:
+def divide_cluster(points: F32, seeds: I32, together: F64, z_weight: float, cell_m: float, most_cells: int) -> I32:
+    """(M,) int32 the part of each point of a cluster, numbered from 0 in the order of the seeds' groups; all 0 if it
+    stays whole, as with more than ``most_cells`` cells of ``cell_m``, of which each counts as one return.
+
+    seeds: (M,) group of each seed, −1 for the other points. together: (G, G) two groups are one part if the gap between
+    them, m, is no larger than this.
+    """
+    cell, first = _thinned(points, z_weight, cell_m)
+    if len(first) > most_cells:
+        return np.zeros(len(points), dtype=np.int32)
+    seed = np.full(len(first), -1, dtype=np.int32)
+    for i in range(len(points)):
+        seed[cell[i]] = max(seed[cell[i]], seeds[i])
+    group = _join(points[first], seed, z_weight)
+    gaps = _measure_gaps(points[first], group, len(together), z_weight)
+    part = _grouped(gaps, together)
+    number, used = np.full(len(part), -1, dtype=np.int32), np.zeros(len(part), dtype=np.bool_)
+    for k in range(len(group)):
+        used[part[group[k]]] = True
+    count = 0
+    for n in range(len(part)):
+        if used[n]:
+            number[n] = count
+            count += 1
+    found = np.empty(len(points), dtype=np.int32)
+    for i in range(len(points)):
+        found[i] = number[part[group[cell[i]]]]
+    return found
+
+
+@numba.njit(cache=True, nogil=True)
+def _thinned(points, z_weight, cell_m):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """(M,) the cell of each point, and (K,) the first point of each cell."""
+    place = np.empty((len(points), 3), dtype=np.int64)
+    for i in range(len(points)):
+        for axis in range(3):
+            place[i, axis] = np.floor(np.float64(points[i, axis]) * (z_weight if axis == 2 else 1.0) / cell_m)
+    low, high = place[0].copy(), place[0].copy()
+    for i in range(len(points)):
+        for axis in range(3):
+            low[axis], high[axis] = min(low[axis], place[i, axis]), max(high[axis], place[i, axis])
+    deep, tall = high[1] - low[1] + 1, high[2] - low[2] + 1
+    key = ((place[:, 0] - low[0]) * deep + place[:, 1] - low[1]) * tall + place[:, 2] - low[2]
+    order = np.argsort(key, kind="mergesort")
+    cell, first = np.empty(len(points), dtype=np.int64), np.empty(len(points), dtype=np.int64)
+    count = 0
+    for k in range(len(order)):
+        if k == 0 or key[order[k]] != key[order[k - 1]]:
+            first[count] = order[k]
+            count += 1
+        cell[order[k]] = count - 1
+    return cell, first[:count]
+
+
+@numba.njit(cache=True, nogil=True)
+def _grouped(gaps, together):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """(G,) the connected component of each group, numbered from 0, where pairs no farther apart than ``together`` are
+    connected."""
+    part = np.full(len(gaps), -1, dtype=np.int32)
+    count, reached = 0, np.empty(len(gaps), dtype=np.int64)
+    for n in range(len(gaps)):
+        if part[n] >= 0:
+            continue
+        reached[0], part[n], left = n, count, 1
+        while left > 0:
+            left -= 1
+            at = reached[left]
+            for k in range(len(gaps)):
+                if part[k] < 0 and gaps[at, k] <= together[at, k]:
+                    part[k], reached[left] = count, k
+                    left += 1
+        count += 1
+    return part
+
+
+@numba.njit(cache=True, nogil=True)
+def _join(points, seeds, z_weight):  # type: ignore[no-untyped-def]  # pragma: no cover
     """(M,) int32 the group of each point: that of the seed it is joined with by a minimum spanning forest (Prim).
 
     seeds: (M,) group of each seed, −1 for the other points.
@@ -119,7 +195,7 @@ def join(points: F32, seeds: I32, z_weight: float) -> I32:
 
 
 @numba.njit(cache=True, nogil=True)
-def measure_gaps(points: F32, part: I32, parts: int, z_weight: float) -> F64:
+def _measure_gaps(points, part, parts, z_weight):  # type: ignore[no-untyped-def]  # pragma: no cover
     """(P, P) smallest distance between points of two parts, m."""
     gaps = np.full((parts, parts), np.inf)
     for i in range(len(points)):

@@ -36,9 +36,9 @@ MIN_HITS = 5
 _APART_MPS, _APART_SIGMAS = 2.0, 3.0
 """Two tracks move apart if their velocities differ by more than both limits. The reference point of a footprint that
 grows while we pass moves at up to 1–2 m/s."""
-_GAP_M = 0.3
+_GAP_M, _GAP_RAD = 0.3, np.radians(0.6)
 """Neighbouring returns of one surface are closer: along a ring of a VLP-16 0.1 m at 28 m, twice that where it is
-down-sampled."""
+down-sampled. Farther away, three of its rays are wider than that."""
 _NEARER_M, _CLOSING_MPS = 0.5, 5.0
 """A vehicle that drives ahead ends at its rear: what is nearer than that by the first, and not connected to it, is
 something else, such as the flank of the parked car that it passes. Two standard deviations of a cluster's position are
@@ -85,17 +85,18 @@ def divide(
         return labels
     expected = _expect([tracks[n] for n in known], filters.cov[known], dt_s)
     sides = steady_sides(history[known], np.nanmax(history[:, :, 0]) + dt_s, WIDEST_M)
-    # only clusters near two or more tracks, or wider than the one they are near, and what else is near these tracks
-    reached, width_m, low_m = kernels.reach_clusters(points, labels, expected.footprints, count)
+    # only clusters near two or more tracks, or beyond the sides of the one they are near, and what else is near these
+    reached, low, high = kernels.reach_clusters(points, labels, expected.footprints, count)
     nearest = _nearest(expected, params)
-    grown = (width_m > WIDEST_M) | (low_m < nearest[:, None])
+    beyond_m = np.maximum(sides[:, :1] - low[:, 1], high[:, 1] - sides[:, 1:])
+    grown = (beyond_m > kernels.AROUND_M) | (low[:, 0] < nearest[:, None])
     widened = np.any(reached & (np.diff(sides) < WIDEST_M) & grown, axis=0)
     involved = np.any(reached[:, (reached.sum(axis=0) >= 2) | widened], axis=1, keepdims=True)
     if not np.any(involved):
         return labels
     owner = kernels.find_owners(points, labels, expected.footprints, sides, nearest, reached & involved)
     seeds = kernels.count_seeds(labels, owner, len(known), count)
-    outside = np.bincount(labels[(labels >= 0) & (owner == kernels.OUTSIDE)], minlength=count) >= _LEAST_SEEDS
+    outside = np.bincount(labels[(labels >= 0) & (owner == kernels.OUTSIDE)], minlength=count) > 0
     sharing = (seeds >= _LEAST_SEEDS).sum(axis=0)
     pieces, parts = labels.copy(), []
     for which in np.flatnonzero((sharing >= 2) | ((sharing == 1) & widened & outside)).tolist():
@@ -112,11 +113,11 @@ def divide(
 def _homed(pieces: I32, parts: list[list[int]], owner: I32, tracks: int, min_points: int) -> I32:
     """Labels in which the pieces of divided clusters are merged with the other points of their tracks.
 
-    parts: numbers of the pieces of each divided cluster. A piece that is too small for a cluster and belongs to no
-    track stays with the largest part of its cluster.
+    parts: numbers of the pieces of each divided cluster. A piece that is too small for a cluster stays with the largest
+    part of its cluster if it holds returns of a track; else it is none, as anywhere else.
     """
     seeds, sizes = kernels.count_seeds(pieces, owner, tracks, int(pieces.max()) + 1), np.bincount(pieces[pieces >= 0])
-    goes_to = np.arange(len(sizes), dtype=np.int32)
+    goes_to = np.append(np.arange(len(sizes)), -1).astype(np.int32)  # the last entry is for points without a cluster
     for numbers in parts:
         largest = max(numbers, key=lambda number: int(sizes[number]))
         for number in numbers:
@@ -125,10 +126,9 @@ def _homed(pieces: I32, parts: list[list[int]], owner: I32, tracks: int, min_poi
             if home != number and goes_to[home] == home and home not in numbers:
                 goes_to[number] = home
             elif sizes[number] < min_points:
-                goes_to[number] = largest
+                goes_to[number] = largest if seeds[track, number] > 0 else -1
     for _ in parts:  # the target may have been merged itself
         goes_to = goes_to[goes_to]
-    goes_to = np.append(goes_to, -1).astype(np.int32)  # the last entry is for points without a cluster
     return goes_to[pieces]
 
 
@@ -144,8 +144,7 @@ def warm_up(points: F32, labels: I32, tracks: Sequence[LidarTrack]) -> None:
         kernels.reach_clusters(points, labels, expected.footprints, 1)[0],
     )
     kernels.count_seeds(labels, owner, len(tracks), 1)
-    joined = kernels.join(points[:2], np.arange(2, dtype=np.int32), 1.0)
-    kernels.measure_gaps(points[:2], joined, 2, 1.0)
+    kernels.divide_cluster(points[:2], np.arange(2, dtype=np.int32), np.zeros((2, 2)), 1.0, _CELL_M, _MOST_CELLS)
 
 
 def _expect(tracks: Sequence[LidarTrack], cov: F64, dt_s: float) -> _Expected:
@@ -173,40 +172,25 @@ def _parts(
     """(M,) int32 the part of each point of a cluster, 0 first; None if it stays whole.
 
     owner: (M,) the track of each point that is a seed, else negative. present: tracks with enough seeds. widened: the
-    cluster is wider than any vehicle, or nearer than a track, so what is beside or before its tracks may be something
-    else that no track follows yet.
+    cluster reaches beyond the sides of a track, or nearer, so what is beside or before its tracks may be something else
+    that no track follows yet.
     """
     groups = len(present) + 1  # the last for what is beside the tracks
     apart, wide = np.zeros((groups, groups), dtype=np.bool_), np.full((groups, groups), widened)
-    apart[:-1, :-1] = _move_apart(expected.velocity[present], expected.variance[present])
-    wide[:-1, :-1] = _are_wide(expected.footprints[present])
+    if len(present) > 1:
+        apart[:-1, :-1] = _move_apart(expected.velocity[present], expected.variance[present])
+        wide[:-1, :-1] = _are_wide(expected.footprints[present])
     if not np.any(apart | wide):
-        return None
-    first, cell = _thinned(points, params.z_weight)
-    if len(first) > _MOST_CELLS:
         return None
     number = np.full(len(expected.velocity) + 2, -1, dtype=np.int32)  # the last two are for points that are no seeds
     number[present] = np.arange(len(present), dtype=np.int32)
     number[kernels.OUTSIDE] = len(present) if widened else -1
-    seeds = np.full(len(first), -1, dtype=np.int32)
-    np.maximum.at(seeds, cell, number[owner])
-    part = kernels.join(points[first], seeds, params.z_weight)
-    gaps = kernels.measure_gaps(points[first], part, groups, params.z_weight)
+    gap_m = max(_GAP_M, _GAP_RAD * float(np.hypot(points[:, 0], points[:, 1]).min()))
     # pairs that neither condition separates are treated as without tracks
-    together = np.where(wide, _GAP_M, params.tolerance_m)
-    part = _grouped(((gaps <= together) & ~apart) | np.eye(groups, dtype=np.bool_))[part][cell]
-    part = np.unique(part, return_inverse=True)[1].astype(np.int32)
+    together = np.where(wide, gap_m, params.tolerance_m)
+    together[apart] = -1.0
+    part = kernels.divide_cluster(points, number[owner], together, params.z_weight, _CELL_M, _MOST_CELLS)
     return part if part.max() > 0 else None
-
-
-def _thinned(points: F32, z_weight: float) -> tuple[I64, I64]:
-    """(K,) the first point of each occupied cell, and (M,) the cell of each point."""
-    place = np.floor(points[:, :3] * (1.0, 1.0, z_weight) / _CELL_M).astype(np.int64)
-    place -= place.min(axis=0)
-    x, y, z = place.T
-    depth, height = place[:, 1].max() + 1, place[:, 2].max() + 1
-    _, first, cell = np.unique((x * depth + y) * height + z, return_index=True, return_inverse=True)
-    return first, cell
 
 
 def _move_apart(velocity: F64, variance: F64) -> Mask:
@@ -235,19 +219,6 @@ def _together(corners: F64) -> F64:
     low, high = corners.min(axis=1), corners.max(axis=1)
     extent: F64 = np.maximum(high[:, None], high[None]) - np.minimum(low[:, None], low[None])
     return extent
-
-
-def _grouped(same: Mask) -> I32:
-    """(T,) int32 component of each element in a symmetric relation (T, T), numbered from 0."""
-    groups = np.full(len(same), -1, dtype=np.int32)
-    for n in range(len(same)):
-        if groups[n] < 0:
-            number, reached = groups.max() + 1, [n]
-            while reached:
-                at = reached.pop()
-                groups[at] = number
-                reached += np.flatnonzero(same[at] & (groups < 0)).tolist()
-    return groups
 
 
 def _renumbered(labels: I32) -> I32:

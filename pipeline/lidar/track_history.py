@@ -71,13 +71,14 @@ def rigid_sideways(history: F64) -> F64:
     A parked car's footprint grows while we pass, as more of its flank becomes visible: its reference point moves by
     metres, but one of its sides does not. If a car pulls out, both sides move.
     """
-    return np.asarray(_rigid_sideways(np.ascontiguousarray(history)))
+    return np.asarray(_common_speed(np.ascontiguousarray(history), _SURE_SIGMAS))
 
 
 def steady_sides(history: F64, now_s: float, widest_m: float) -> F64:
     """(T, 2) the lateral extent of each track now, right and left, ego y in metres: the median of the sightings in its
-    (T, H, 5) history, each moved by the speed common to both sides. Sightings wider than ``widest_m`` count only if
-    fewer than ``_NARROW`` others remain.
+    (T, H, 5) history, each moved by the speed common to both sides: the most likely one, since a lower one would leave
+    the extent of a vehicle that steers behind, over what stands beside it. Sightings wider than ``widest_m`` count only
+    if fewer than ``_NARROW`` others remain.
 
     A rigid body does not widen from one sweep to the next; a cluster does, by returns from what stands beside it. Along
     a row of parked cars it may do so in most sweeps of a second.
@@ -107,8 +108,8 @@ def _slopes(history):  # type: ignore[no-untyped-def]  # pragma: no cover
 
 
 @numba.njit(cache=True, nogil=True)
-def _rigid_sideways(history):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Kernel of ``rigid_sideways``."""
+def _common_speed(history, sigmas):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Kernel of ``rigid_sideways``: the smaller speed of the two sides, minus ``sigmas`` of its standard deviation."""
     out = np.zeros(len(history))
     for i in range(len(history)):
         known = np.flatnonzero(~np.isnan(history[i, :, 0]))
@@ -121,7 +122,7 @@ def _rigid_sideways(history):  # type: ignore[no-untyped-def]  # pragma: no cove
             speed[c] = (t * y).sum() / spread
             residual = ((y - t * speed[c]) ** 2).sum() / max(len(known) - 2, 1)
             noise_m = np.sqrt(max(residual, _SIDE_NOISE_M**2))
-            sure[c] = abs(speed[c]) - _SURE_SIGMAS * (noise_m / np.sqrt(spread))
+            sure[c] = abs(speed[c]) - sigmas * (noise_m / np.sqrt(spread))
         if np.sign(speed[0]) == np.sign(speed[1]):
             out[i] = np.sign(speed[0]) * max(sure.min(), 0.0)
     return out
@@ -130,7 +131,7 @@ def _rigid_sideways(history):  # type: ignore[no-untyped-def]  # pragma: no cove
 @numba.njit(cache=True, nogil=True)
 def _steady_sides(history, now_s, widest_m):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Kernel of ``steady_sides``."""
-    out, speed = np.empty((len(history), 2)), _rigid_sideways(history)
+    out, speed = np.empty((len(history), 2)), _common_speed(history, 0.0)
     for i in range(len(history)):
         chosen = np.flatnonzero(history[i, :, 4] - history[i, :, 3] <= widest_m)
         if len(chosen) < _NARROW:

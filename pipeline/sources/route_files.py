@@ -80,7 +80,9 @@ def _route(name: str, rows: PositionRows, sigma_m: float, path: str) -> Route:
     if len(set(good)) < 2:
         raise RouteError(f"{path}: no route: {len(set(good))} distinct valid positions; at least 2 are needed")
     lat, lon = np.array(good).T
-    apart_m = Geod(ellps="WGS84").inv(lon[:-1], lat[:-1], lon[1:], lat[1:])[2]
+    # lists, since pyproj before 3.8 takes an array of one element for a number, which numpy deprecates
+    ends = [each.tolist() for each in (lon[:-1], lat[:-1], lon[1:], lat[1:])]
+    apart_m = np.array(Geod(ellps="WGS84").inv(*ends)[2])
     if apart_m.max() > _LONGEST_GAP_M or apart_m.sum() > _LONGEST_M:
         raise RouteError(
             f"{path}: no route: it is {apart_m.sum() / 1e3:,.0f} km long, with {apart_m.max() / 1e3:,.0f} km between "
