@@ -15,6 +15,8 @@ AROUND_M = 0.3
 
 OUTSIDE = -2
 """Owner of a point that is beside or before every track of its cluster."""
+NEARER_M = 0.3
+"""Returns nearer than others by this are no more distant part of the same surface."""
 
 
 @numba.njit(cache=True, nogil=True)
@@ -39,12 +41,16 @@ def reach_clusters(points: F32, labels: I32, footprints: F64, clusters: int) -> 
 
 
 @numba.njit(cache=True, nogil=True)
-def find_owners(points: F32, labels: I32, footprints: F64, sides: F64, nearest: F64, reached: Mask) -> I32:
+def find_owners(
+    points: F32, labels: I32, footprints: F64, sides: F64, likely: F64, nearest: F64, reached: Mask, wide: Mask
+) -> I32:
     """(N,) int32 the only footprint that contains a clustered point or is close to it, −1 for none or several, OUTSIDE
     for a point beside or before all of them.
 
-    sides: (T, 2) steady lateral extent of each track, outside of which no point is surely its own. nearest: (T,) ego x
-    below which none is. reached: (T, C) bool, the footprints to test for each cluster.
+    sides, likely: (T, 2) lateral extent of each track, by the speed that is sure and by the likely one. Beside it, no
+    point is surely its own. The first holds in ``wide`` clusters, (C,) bool, which are divided on less evidence, the
+    second in others. nearest: (T,) ego x below which no point is. reached: (T, C) bool, the footprints to test for each
+    cluster.
     """
     near = np.empty((reached.shape[1], len(footprints)), dtype=np.int32)
     count = np.zeros(reached.shape[1], dtype=np.int32)
@@ -58,12 +64,13 @@ def find_owners(points: F32, labels: I32, footprints: F64, sides: F64, nearest: 
         if labels[i] < 0:
             continue
         found, beside = 0, 0
+        side = sides if wide[labels[i]] else likely
         for k in range(count[labels[i]]):
             t = near[labels[i], k]
             x, y, length, width, cos, sin = footprints[t]
             dx, dy = points[i, 0] - x, points[i, 1] - y
             along, across = abs(dx * cos + dy * sin) - length, abs(dy * cos - dx * sin) - width
-            is_beside = max(sides[t, 0] - points[i, 1], points[i, 1] - sides[t, 1]) > AROUND_M
+            is_beside = max(side[t, 0] - points[i, 1], points[i, 1] - side[t, 1]) > AROUND_M
             if is_beside or points[i, 0] < nearest[t]:
                 beside += 1
                 continue
@@ -88,12 +95,15 @@ def count_seeds(labels: I32, owner: I32, tracks: int, clusters: int) -> I32:
 
 
 @numba.njit(cache=True, nogil=True)
-def divide_cluster(points: F32, seeds: I32, together: F64, z_weight: float, cell_m: float, most_cells: int) -> I32:
+def divide_cluster(
+    points: F32, seeds: I32, together: F64, rays_rad: float, z_weight: float, cell_m: float, most_cells: int
+) -> I32:
     """(M,) int32 the part of each point of a cluster, numbered from 0 in the order of the seeds' groups; all 0 if it
     stays whole, as with more than ``most_cells`` cells of ``cell_m``, of which each counts as one return.
 
     seeds: (M,) group of each seed, −1 for the other points. together: (G, G) two groups are one part if the gap between
-    them, m, is no larger than this.
+    them, m, is no larger than this. rays_rad: they also are if the last group has a return no nearer than one of the
+    other that is closer to it than this in azimuth.
     """
     cell, first = _thinned(points, z_weight, cell_m)
     if len(first) > most_cells:
@@ -102,7 +112,7 @@ def divide_cluster(points: F32, seeds: I32, together: F64, z_weight: float, cell
     for i in range(len(points)):
         seed[cell[i]] = max(seed[cell[i]], seeds[i])
     group = _join(points[first], seed, z_weight)
-    gaps = _measure_gaps(points[first], group, len(together), z_weight)
+    gaps = _measure_gaps(points[first], group, len(together), rays_rad, z_weight)
     part = _grouped(gaps, together)
     number, used = np.full(len(part), -1, dtype=np.int32), np.zeros(len(part), dtype=np.bool_)
     for k in range(len(group)):
@@ -195,15 +205,21 @@ def _join(points, seeds, z_weight):  # type: ignore[no-untyped-def]  # pragma: n
 
 
 @numba.njit(cache=True, nogil=True)
-def _measure_gaps(points, part, parts, z_weight):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """(P, P) smallest distance between points of two parts, m."""
+def _measure_gaps(points, part, parts, rays_rad, z_weight):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """(P, P) smallest distance between points of two parts, m; 0 if the last part continues the other without a gap of
+    ``rays_rad`` in azimuth."""
     gaps = np.full((parts, parts), np.inf)
+    azimuth, away = np.arctan2(points[:, 1], points[:, 0]), np.hypot(points[:, 0], points[:, 1])
     for i in range(len(points)):
         for j in range(i):
             if part[i] != part[j]:
                 dx, dy = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]
                 dz = z_weight * (points[i, 2] - points[j, 2])
-                away = np.sqrt(dx * dx + dy * dy + dz * dz)
-                if away < gaps[part[i], part[j]]:
-                    gaps[part[i], part[j]] = gaps[part[j], part[i]] = away
+                gap = np.sqrt(dx * dx + dy * dy + dz * dz)
+                last, other = (i, j) if part[i] > part[j] else (j, i)
+                continues = away[last] > away[other] - NEARER_M and abs(azimuth[i] - azimuth[j]) < rays_rad
+                if continues and part[last] == parts - 1:
+                    gap = 0.0
+                if gap < gaps[part[i], part[j]]:
+                    gaps[part[i], part[j]] = gaps[part[j], part[i]] = gap
     return gaps

@@ -9,7 +9,8 @@ One track is enough if its vehicle is narrower than the cluster: a rigid body do
 lateral extent that it had over the last second belong to something that no track follows yet, as when the next parked
 car comes into view beside a bus. Nor does it grow towards us: returns before the rear of a vehicle that drives ahead
 are those of a parked car that it passes. Here too, the two must leave a gap, or else a side of the vehicle came into
-view.
+view. In a cluster that is no wider than a vehicle may be, that is not enough: the returns of a flank seen at a grazing
+angle are metres apart, but in neighbouring rays. What rays pass beside, or what is nearer, is something else.
 
 Returns within an expected footprint are its seeds. Every other return of the cluster joins the seeds that it is linked
 with by the shortest steps (a minimum spanning forest, like a watershed): a side that comes into view joins its rear,
@@ -84,41 +85,47 @@ def divide(
     if not params.divide_tracked or dt_s is None or not known or count == 0:
         return labels
     expected = _expect([tracks[n] for n in known], filters.cov[known], dt_s)
-    sides = steady_sides(history[known], np.nanmax(history[:, :, 0]) + dt_s, WIDEST_M)
-    # only clusters near two or more tracks, or beyond the sides of the one they are near, and what else is near these
+    now_s = np.nanmax(history[:, :, 0]) + dt_s
+    sides = steady_sides(history[known], now_s, WIDEST_M)
+    likely = steady_sides(history[known], now_s, WIDEST_M, 0.0)
+    # only clusters near two or more tracks, or wider or nearer than the one they are near, and what else is near these
     reached, low, high = kernels.reach_clusters(points, labels, expected.footprints, count)
     nearest = _nearest(expected, params)
-    beyond_m = np.maximum(sides[:, :1] - low[:, 1], high[:, 1] - sides[:, 1:])
-    grown = (beyond_m > kernels.AROUND_M) | (low[:, 0] < nearest[:, None])
-    widened = np.any(reached & (np.diff(sides) < WIDEST_M) & grown, axis=0)
+    narrow = reached & (np.diff(sides) < WIDEST_M)
+    wide = high[:, 1] - low[:, 1] > WIDEST_M
+    beyond_m = np.maximum(likely[:, :1] - low[:, 1], high[:, 1] - likely[:, 1:])
+    grown = wide | (low[:, 0] < nearest[:, None]) | (beyond_m > kernels.AROUND_M)
+    widened = np.any(narrow & grown, axis=0)
     involved = np.any(reached[:, (reached.sum(axis=0) >= 2) | widened], axis=1, keepdims=True)
     if not np.any(involved):
         return labels
-    owner = kernels.find_owners(points, labels, expected.footprints, sides, nearest, reached & involved)
+    owner = kernels.find_owners(points, labels, expected.footprints, sides, likely, nearest, reached & involved, wide)
     seeds = kernels.count_seeds(labels, owner, len(known), count)
-    outside = np.bincount(labels[(labels >= 0) & (owner == kernels.OUTSIDE)], minlength=count) > 0
+    beside = np.bincount(labels[(labels >= 0) & (owner == kernels.OUTSIDE)], minlength=count)
+    outside = beside >= np.where(wide, _LEAST_SEEDS, 1)
     sharing = (seeds >= _LEAST_SEEDS).sum(axis=0)
     pieces, parts = labels.copy(), []
     for which in np.flatnonzero((sharing >= 2) | ((sharing == 1) & widened & outside)).tolist():
         present = np.flatnonzero(seeds[:, which] >= _LEAST_SEEDS)
         members = np.flatnonzero(labels == which)
-        part = _parts(points[members], owner[members], present, bool(widened[which]), expected, params)
+        rays_rad = 0.0 if wide[which] else _GAP_RAD
+        part = _parts(points[members], owner[members], present, bool(widened[which]), rays_rad, expected, params)
         if part is not None:
             numbers = np.concatenate([[which], pieces.max() + np.arange(1, part.max() + 1)]).astype(np.int32)
             pieces[members] = numbers[part]
-            parts.append(numbers.tolist())
+            parts.append((bool(wide[which]), numbers.tolist()))
     return _renumbered(_homed(pieces, parts, owner, len(known), params.min_points)) if parts else labels
 
 
-def _homed(pieces: I32, parts: list[list[int]], owner: I32, tracks: int, min_points: int) -> I32:
+def _homed(pieces: I32, parts: list[tuple[bool, list[int]]], owner: I32, tracks: int, min_points: int) -> I32:
     """Labels in which the pieces of divided clusters are merged with the other points of their tracks.
 
-    parts: numbers of the pieces of each divided cluster. A piece that is too small for a cluster stays with the largest
-    part of its cluster if it holds returns of a track; else it is none, as anywhere else.
+    parts: whether each divided cluster was wider than any vehicle, and the numbers of its pieces. A piece that is too
+    small for a cluster stays with the largest part of a wide one; else it is none, since it would move the track.
     """
     seeds, sizes = kernels.count_seeds(pieces, owner, tracks, int(pieces.max()) + 1), np.bincount(pieces[pieces >= 0])
     goes_to = np.append(np.arange(len(sizes)), -1).astype(np.int32)  # the last entry is for points without a cluster
-    for numbers in parts:
+    for was_wide, numbers in parts:
         largest = max(numbers, key=lambda number: int(sizes[number]))
         for number in numbers:
             track = int(seeds[:, number].argmax())
@@ -126,7 +133,7 @@ def _homed(pieces: I32, parts: list[list[int]], owner: I32, tracks: int, min_poi
             if home != number and goes_to[home] == home and home not in numbers:
                 goes_to[number] = home
             elif sizes[number] < min_points:
-                goes_to[number] = largest if seeds[track, number] > 0 else -1
+                goes_to[number] = largest if was_wide or seeds[track, number] > 0 else -1
     for _ in parts:  # the target may have been merged itself
         goes_to = goes_to[goes_to]
     return goes_to[pieces]
@@ -140,11 +147,13 @@ def warm_up(points: F32, labels: I32, tracks: Sequence[LidarTrack]) -> None:
         labels,
         expected.footprints,
         np.zeros((len(tracks), 2)),
+        np.zeros((len(tracks), 2)),
         np.zeros(len(tracks)),
         kernels.reach_clusters(points, labels, expected.footprints, 1)[0],
+        np.zeros(1, dtype=np.bool_),
     )
     kernels.count_seeds(labels, owner, len(tracks), 1)
-    kernels.divide_cluster(points[:2], np.arange(2, dtype=np.int32), np.zeros((2, 2)), 1.0, _CELL_M, _MOST_CELLS)
+    kernels.divide_cluster(points[:2], np.arange(2, dtype=np.int32), np.zeros((2, 2)), 0.0, 1.0, _CELL_M, _MOST_CELLS)
 
 
 def _expect(tracks: Sequence[LidarTrack], cov: F64, dt_s: float) -> _Expected:
@@ -167,13 +176,13 @@ def _nearest(expected: _Expected, params: ClusterParams) -> F64:
 
 
 def _parts(
-    points: F32, owner: I32, present: I64, widened: bool, expected: _Expected, params: ClusterParams
+    points: F32, owner: I32, present: I64, widened: bool, rays_rad: float, expected: _Expected, params: ClusterParams
 ) -> I32 | None:
     """(M,) int32 the part of each point of a cluster, 0 first; None if it stays whole.
 
     owner: (M,) the track of each point that is a seed, else negative. present: tracks with enough seeds. widened: the
-    cluster reaches beyond the sides of a track, or nearer, so what is beside or before its tracks may be something else
-    that no track follows yet.
+    cluster is wider or nearer than its track, so what is beside or before it may be something else that no track
+    follows yet. rays_rad: without a gap of this azimuth, what is no nearer than a track is its flank.
     """
     groups = len(present) + 1  # the last for what is beside the tracks
     apart, wide = np.zeros((groups, groups), dtype=np.bool_), np.full((groups, groups), widened)
@@ -189,7 +198,7 @@ def _parts(
     # pairs that neither condition separates are treated as without tracks
     together = np.where(wide, gap_m, params.tolerance_m)
     together[apart] = -1.0
-    part = kernels.divide_cluster(points, number[owner], together, params.z_weight, _CELL_M, _MOST_CELLS)
+    part = kernels.divide_cluster(points, number[owner], together, rays_rad, params.z_weight, _CELL_M, _MOST_CELLS)
     return part if part.max() > 0 else None
 
 

@@ -74,16 +74,15 @@ def rigid_sideways(history: F64) -> F64:
     return np.asarray(_common_speed(np.ascontiguousarray(history), _SURE_SIGMAS))
 
 
-def steady_sides(history: F64, now_s: float, widest_m: float) -> F64:
+def steady_sides(history: F64, now_s: float, widest_m: float, sigmas: float = _SURE_SIGMAS) -> F64:
     """(T, 2) the lateral extent of each track now, right and left, ego y in metres: the median of the sightings in its
-    (T, H, 5) history, each moved by the speed common to both sides: the most likely one, since a lower one would leave
-    the extent of a vehicle that steers behind, over what stands beside it. Sightings wider than ``widest_m`` count only
-    if fewer than ``_NARROW`` others remain.
+    (T, H, 5) history, each moved by the speed common to both sides, minus ``sigmas`` of its standard deviation.
+    Sightings wider than ``widest_m`` count only if fewer than ``_NARROW`` others remain.
 
     A rigid body does not widen from one sweep to the next; a cluster does, by returns from what stands beside it. Along
     a row of parked cars it may do so in most sweeps of a second.
     """
-    return np.asarray(_steady_sides(np.ascontiguousarray(history), now_s, widest_m))
+    return np.asarray(_steady_sides(np.ascontiguousarray(history), now_s, widest_m, sigmas))
 
 
 def warm_up() -> None:
@@ -129,9 +128,9 @@ def _common_speed(history, sigmas):  # type: ignore[no-untyped-def]  # pragma: n
 
 
 @numba.njit(cache=True, nogil=True)
-def _steady_sides(history, now_s, widest_m):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _steady_sides(history, now_s, widest_m, sigmas):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Kernel of ``steady_sides``."""
-    out, speed = np.empty((len(history), 2)), _common_speed(history, 0.0)
+    out, speed = np.empty((len(history), 2)), _common_speed(history, sigmas)
     for i in range(len(history)):
         chosen = np.flatnonzero(history[i, :, 4] - history[i, :, 3] <= widest_m)
         if len(chosen) < _NARROW:
