@@ -15,8 +15,8 @@ AROUND_M = 0.3
 
 OUTSIDE = -2
 """Owner of a point that is beside or before every track of its cluster."""
-NEARER_M = 0.3
-"""Returns nearer than others by this are no more distant part of the same surface."""
+_STEP_M = 0.3
+"""A return nearer than another by this is before its surface: ten times the noise of a VLP-16's range."""
 
 
 @numba.njit(cache=True, nogil=True)
@@ -217,7 +217,7 @@ def _measure_gaps(points, part, parts, rays_rad, z_weight):  # type: ignore[no-u
                 dz = z_weight * (points[i, 2] - points[j, 2])
                 gap = np.sqrt(dx * dx + dy * dy + dz * dz)
                 last, other = (i, j) if part[i] > part[j] else (j, i)
-                continues = away[last] > away[other] - NEARER_M and abs(azimuth[i] - azimuth[j]) < rays_rad
+                continues = away[last] > away[other] - _STEP_M and abs(azimuth[i] - azimuth[j]) < rays_rad
                 if continues and part[last] == parts - 1:
                     gap = 0.0
                 if gap < gaps[part[i], part[j]]:
