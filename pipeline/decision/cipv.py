@@ -16,7 +16,8 @@ from typing import NamedTuple
 
 from pipeline.common.fast_replace import evolve
 from pipeline.decision.crossing import clears_path_s
-from pipeline.decision.gates import Candidate, judge, may_cut_in
+from pipeline.decision.cutting_in import cuts_in
+from pipeline.decision.gates import Candidate, judge
 from pipeline.decision.object_motion import closing_speed_mps
 from pipeline.decision.path_position import place
 from pipeline.decision.place import SURE, Place
@@ -88,6 +89,8 @@ class _Judged(NamedTuple):
     """Time for which it was seen to drive in our lane."""
     boxed_s: float
     """Time for which both sensors saw it, the camera as a vehicle."""
+    cuts_in: bool
+    """Whether it will be in the path soon."""
     why_not: str | None
     """Why it cannot be the lead; None if it can."""
 
@@ -112,7 +115,7 @@ def choose(
     choice = Choice(
         objects=tuple(each.item for each in judged),
         lead=_named(lead, _why(lead, len(able))) if lead is not None else None,
-        next_lead=_next_lead([each.item for each in judged], able, lead, params),
+        next_lead=_next_lead([each.item for each in judged if each.cuts_in], able, lead, params),
         rejected=tuple(_rejections(judged, lead)),
     )
     odds = {each.item.id: each.odds for each in judged if each.odds is not None}
@@ -175,7 +178,7 @@ def _judge(
         crossing_s=crossing_s,
         clears_path_s=clears_s,
     )
-    return _Judged(item, odds, driving_s, in_lane_s, boxed_s, verdict.why_not)
+    return _Judged(item, odds, driving_s, in_lane_s, boxed_s, cuts_in(item, where, params), verdict.why_not)
 
 
 def _rejections(judged: list[_Judged], lead: FusedObject | None) -> Iterator[Rejection]:
@@ -207,31 +210,15 @@ def _why_after(item: FusedObject, lead: FusedObject) -> str:
 # ---------------------------------------------------------------- next lead
 
 
-def _is_outside(item: FusedObject) -> bool:
-    """Outside the path, or crossing its edge just now."""
-    surely_in = item.in_path and item.eligibility is not None and item.eligibility.probable
-    return not item.in_path or (not surely_in and item.crossing_s == 0.0)
-
-
 def _next_lead(
-    judged: list[FusedObject], able: list[FusedObject], lead: FusedObject | None, params: CipvParams
+    cutting_in: list[FusedObject], able: list[FusedObject], lead: FusedObject | None, params: CipvParams
 ) -> Cipv | None:
     """The next CIPV: a vehicle nearer than the lead that will enter the path first; otherwise the one behind the
     lead."""
     lead_m = lead.distance_m if lead is not None and lead.distance_m is not None else float("inf")
-    cutting_in = [
-        item
-        for item in judged
-        if _is_outside(item)
-        and item.clears_path_s is None
-        and item.crossing_s is not None
-        and item.crossing_s <= params.cut_in_s
-        and (item.distance_m or 0.0) < lead_m
-        and not item.carried
-        and may_cut_in(item)
-    ]
-    if cutting_in:
-        first = min(cutting_in, key=lambda item: (item.crossing_s or 0.0, item.id))
+    nearer = [item for item in cutting_in if (item.distance_m or 0.0) < lead_m]
+    if nearer:
+        first = min(nearer, key=lambda item: (item.crossing_s or 0.0, item.id))
         return _named(first, f"cutting in: enters the path in {first.crossing_s:.1f} s")
     behind = [item for item in able if lead is not None and item.id != lead.id and (item.distance_m or 0.0) > lead_m]
     if lead is None or not behind:

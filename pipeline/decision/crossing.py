@@ -20,7 +20,7 @@ seconds to leave the path, in which it may as well stop."""
 _FLANK_M = 3.2
 """Extent across the path from which an object shows its flank: no vehicle that drives along the path is as wide. Used
 only without ego speed, when the speed along the path is not known."""
-_FEWEST_RANGES = 5
+FEWEST_RANGES = 5
 """Distances in a row after which the camera alone knows a lateral speed: those of the first boxes of far vehicles
 are off by up to 20 m/s."""
 _ARRIVING_MPS = 0.5
@@ -55,7 +55,7 @@ def clears_path_s(
 
 def _has_velocity(item: FusedObject) -> bool:
     """Whether its lateral speed is known. What the LiDAR has only just found has the speed of its first boxes."""
-    return has_ranged_velocity(item) or item.camera_ranges >= _FEWEST_RANGES
+    return has_ranged_velocity(item) or item.camera_ranges >= FEWEST_RANGES
 
 
 def _crosses(where: Place, is_ego_speed_known: bool) -> bool:

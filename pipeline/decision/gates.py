@@ -125,12 +125,6 @@ def judge(who: Candidate) -> GateVerdict:
     return GateVerdict(eligibility, gates, why_not)
 
 
-def may_cut_in(item: FusedObject) -> bool:
-    """Whether an object that is not in the path yet could lead once it is."""
-    found = item.eligibility
-    return found is not None and found.vehicle and found.distance and found.confirmed and found.size
-
-
 def is_solid(item: FusedObject) -> bool:
     """Whether an object certainly exists now and is large enough to matter, whatever its class and position."""
     found = item.eligibility

@@ -161,6 +161,7 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
             "forget_at_takeover": False,
             "confirm_lead": False,
             "narrow_along": False,
+            "prove_cut_in": False,
             "max_short_side_m": 40.0,
             "confirm_hits": 1,
             "carried_may_become_lead": True,

@@ -156,6 +156,11 @@ class CipvParams(Section):
         "sigma; 0: errors of the path have one normal distribution",
     )
     cut_in_s: float = slider(3.0, 0.5, 6.0, 0.1, "s", "Cut-ins and cut-outs are predicted this far ahead")
+    prove_cut_in: bool = choice(
+        True,
+        "The next lead cuts in if it surely exists, drives and moves towards the path; off: if its estimated lateral "
+        "speed leads into the path",
+    )
     use_crossing: bool = choice(True, "A crossing object is in the path only if it is still there when the car arrives")
     crossing_margin_s: float = slider(
         1.0,

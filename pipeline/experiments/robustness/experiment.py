@@ -69,6 +69,7 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "path errors of one normal distribution": {"cipv.road_goes_on": 0.0},
     "flanks taken for rears": {"cipv.use_flank": False},
     "boxes widen what drives along": {"cipv.narrow_along": False},
+    "cut-ins not proved": {"cipv.prove_cut_in": False},
     "heights of other vehicles kept": {"vision_tracking.forget_heights": False},
     "tall boxes treated like others": {"vision_tracking.use_aspect": False},
     "boxes placed by height alone": {"fusion.use_ground_contact": False},

@@ -47,6 +47,7 @@ Kind = Literal[
     "phantom partial braking",
     "phantom comfort braking",
     "phantom lead",
+    "phantom next lead",
     "lead misplaced",
     "lead missed",
     "lead late",
@@ -126,6 +127,7 @@ class Judge:
         lead, doubtful = true_lead(now, path)
         chosen = result.chosen()
         self._judge_choice(now, path, camera, chosen)
+        self._judge_next(now, path, camera, result)
         self._judge_braking(now, path, camera, result)
         self._judge_lead(now, camera, lead, doubtful, chosen)
 
@@ -144,6 +146,19 @@ class Judge:
             self._fail("lead misplaced", how_misplaced(boxed, where), now.t_s, f"{text} is {named(boxed)}")
             return
         self._fail("phantom lead", f"{what(met)}, by {seen_by(chosen)}", now.t_s, text)
+
+    def _judge_next(self, now: World, path: Path, camera: CameraCalibration | None, result: Result) -> None:
+        """A next lead, too, is a vehicle that the car could meet, or its box is that of one."""
+        told = result.next_cipv
+        item = next((each for each in result.objects if told is not None and each.id == told.id), None)
+        where = place(item)
+        if told is None or item is None or where is None or told.distance_m >= MAX_M:
+            return
+        met = vehicles_at(now, where)
+        boxed = vehicle_in_box(now, camera, item)
+        seen = met if boxed is None or boxed in met else [*met, boxed]
+        if not any(_in_path(state, path) for state in seen) and not self._comes_in(now, seen):
+            self._fail("phantom next lead", f"{what(met)}, by {seen_by(item)}", now.t_s, f"#{told.id} {told.reason}")
 
     def _judge_braking(self, now: World, path: Path, camera: CameraCalibration | None, result: Result) -> None:
         acc = result.acc

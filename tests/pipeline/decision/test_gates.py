@@ -84,7 +84,6 @@ def test_an_object_that_was_not_judged_starts_no_reaction() -> None:
     shown = tuple(Gate(each.shown_as, None, 1.0, True) for each in gates.CONDITIONS)
     item = dataclasses.replace(fused(1, 20.0), gates=shown)
     assert not gates.is_solid(item)
-    assert not gates.may_cut_in(item)
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from pipeline.simulation.sensors.truth_boxes import in_image
 from pipeline.simulation.unseen import frames
 from pipeline.simulation.world.world_state import ActorState, World
 from pipeline.step import State, step
-from pipeline.types import Box, CameraCalibration, FusedObject, Point2, Result
+from pipeline.types import Box, CameraCalibration, Cipv, FusedObject, Point2, Result
 
 FRAMES = 12
 """Longer than the time for which a lead may be missed."""
@@ -143,3 +143,32 @@ def test_nothing_is_judged_after_the_script_drove_into_a_vehicle() -> None:
         judge.take(now, camera, evolve(result, cipv=None, acc=None))
         assert judge.is_over is (k >= 1)
     assert not judge.failures, "no lead in twelve frames, eleven of them after the contact"
+
+
+@pytest.mark.parametrize(
+    ("case", "choose", "expected"),
+    [
+        ("the lead itself", lambda item, lead, box: at(item, near_face(lead), box), set()),
+        ("the lead's box, a third too near", lambda item, lead, box: at(item, ahead_of(lead, 0.6), box), set()),
+        (
+            "nothing where there is nothing",
+            lambda item, lead, box: at(item, ahead_of(lead, 0.6), (0.0, 0.0, 30.0, 30.0)),
+            {("phantom next lead", "nothing there, by camera")},
+        ),
+    ],
+)
+def test_a_next_lead_is_a_vehicle_that_the_car_could_meet(
+    case: str, choose: Callable[[FusedObject, ActorState, Box], FusedObject], expected: set[tuple[str, str]]
+) -> None:
+    scene, moments = drive()
+    judge, way = Judge(scene, 1.0 / scene.rate_hz), ScriptedWay.of(scene)
+    for now, camera, result in moments:
+        path, chosen = way.ahead(now), result.chosen()
+        assert path is not None
+        assert chosen is not None
+        lead, _ = true_lead(now, path)
+        assert lead is not None
+        other = evolve(choose(chosen, lead, next(x.bbox for x in in_image(now, camera) if x.actor is lead)), id=999)
+        following = Cipv(999, other.distance_m or 0.0, None, None, "next")
+        judge.take(now, camera, evolve(result, objects=(chosen, other), next_cipv=following, acc=None))
+    assert {(each.kind, each.cause) for each in judge.failures if each.kind == "phantom next lead"} == expected, case
