@@ -22,6 +22,9 @@ the time."""
 _DROVE_S = 0.5
 """A vehicle that the LiDAR has seen driving for so long and that then stands is traffic, not part of the roadside. To
 the camera alone, a parked car may seem to drive for as long."""
+_STILL_S = 0.5
+"""What surely drove this short ago still does: where the LiDAR takes over from the camera, it needs as long to know the
+speed (``pipeline.decision.object_motion``). Its few first returns would be structure in our lane until then."""
 _LOWEST_M = 0.1
 """Minimum sensor height above the road; a lower value means that there is no road below it."""
 
@@ -70,6 +73,8 @@ class EdgeState:
     """What was found in that frame; None if nothing was."""
     drove_s: Mapping[int, float] = field(default_factory=dict)
     """For how long the LiDAR has seen each object driving, by id."""
+    drives_until_s: Mapping[int, float] = field(default_factory=dict)
+    """For how long each object that surely drove still counts as driving, by id."""
 
 
 def follow(
@@ -93,10 +98,12 @@ def follow(
         before = road_structure.standing(before, around.points, around.ring, around.origin, around.sensor_height_m)
     cells = road_structure.merged(before, _seen(around))
     drove_s = _drove_s(state.drove_s, around.objects, dt_s or 0.0)
-    cells = road_structure.without(cells, [item for item in around.objects if _is_traffic(item, drove_s)])
+    drives_until_s = _drives_until_s(state.drives_until_s, around.objects, dt_s or 0.0)
+    traffic = [item for item in around.objects if item.id in drives_until_s or _is_traffic(item, drove_s)]
+    cells = road_structure.without(cells, traffic)
     used = cells if is_shown else road_structure.thinned(cells)
     if is_shown or len(used.xy) < _FEWEST_CELLS:
-        return EdgeState(cells, drove_s=drove_s), None
+        return EdgeState(cells, drove_s=drove_s, drives_until_s=drives_until_s), None
     # The shape with the most structure at a constant distance is the road's, and the nearest structure limits the free
     # width
     starts = road_shape.begin(state.shape, ego, dt_s, state.turn == 0, params)
@@ -105,7 +112,7 @@ def follow(
     left_m, right_m = (np.full(len(shape), each) for each in room_m)
     path = PathEstimate("edges", shape, sigma_m, left_m, right_m)
     edges = Edges(path, used.xy)
-    return EdgeState(cells, shape, (state.turn + 1) % _ANEW_EVERY, edges, drove_s), edges
+    return EdgeState(cells, shape, (state.turn + 1) % _ANEW_EVERY, edges, drove_s, drives_until_s), edges
 
 
 def _drove_s(before: Mapping[int, float], objects: tuple[FusedObject, ...], dt_s: float) -> Mapping[int, float]:
@@ -116,11 +123,22 @@ def _drove_s(before: Mapping[int, float], objects: tuple[FusedObject, ...], dt_s
     }
 
 
+def _drives_until_s(before: Mapping[int, float], objects: tuple[FusedObject, ...], dt_s: float) -> Mapping[int, float]:
+    """Every object that surely drives, or did until a moment ago and is a vehicle to the camera, with the time left for
+    which it counts as driving."""
+    left = {
+        item.id: _STILL_S
+        if road_structure.drives(item)
+        else (before.get(item.id, 0.0) - dt_s if item.label in VEHICLES else 0.0)
+        for item in objects
+    }
+    return {number: left_s for number, left_s in left.items() if left_s > 0.0}
+
+
 def _is_traffic(item: FusedObject, drove_s: Mapping[int, float]) -> bool:
-    """Whether it drives, probably comes towards the car or, like a lead that has stopped, drove earlier. Without the
-    camera, what seemed to drive may be a hedge that came into view bit by bit."""
-    has_driven = item.label in VEHICLES and drove_s.get(item.id, 0.0) >= _DROVE_S
-    return road_structure.drives(item) or road_structure.comes(item) or has_driven
+    """Whether it probably comes towards the car or, like a lead that has stopped, drove earlier. Without the camera,
+    what seemed to drive may be a hedge that came into view bit by bit."""
+    return road_structure.comes(item) or (item.label in VEHICLES and drove_s.get(item.id, 0.0) >= _DROVE_S)
 
 
 def _seen(around: Surroundings) -> Cells:

@@ -15,6 +15,7 @@ from pipeline.params import VisionTrackingParams
 from pipeline.types import HeightFrom, VisionMeasurement, VisionTrack
 from pipeline.vision import place_filter
 from pipeline.vision.place_filter import PlaceMeasurement
+from pipeline.vision.ranged_run import RangedRun
 from pipeline.vision.vehicle_height import (
     BoxShape,
     Height,
@@ -63,6 +64,8 @@ class Followed:
     """Of its boxes; what its height is guessed from until it is learned."""
     contact: RoadContact = RoadContact()
     """Where its boxes meet the road; likewise."""
+    run: RangedRun = RangedRun()
+    """The distances that returns inside its boxes have given."""
     seen: VisionMeasurement | None = None
     """This image's sighting with a distance; None without one."""
     double_of: int | None = None
@@ -124,7 +127,7 @@ def take_place(
     slip_m: how far the box may lie off sideways, beyond its usual noise."""
     if seen.position is None or seen.sigma_m is None or seen.distance_m is None:
         if followed.place_filter is not None:
-            return evolve(followed, track=with_place(followed.track, followed.place_filter, followed.placed))
+            return evolve(followed, track=with_place(followed, followed.place_filter, followed.placed))
         return evolve(followed, track=evolve(followed.track, distance_m=seen.distance_m, sigma_m=seen.sigma_m))
     followed = _hinted(followed, seen, params)
     # a truck that is called a car in one image is as tall as before
@@ -151,7 +154,7 @@ def take_place(
         if nis > params.max_nis:
             # one or two sightings have no standing against a third that contradicts them
             if followed.placed >= _SETTLED and followed.refused + 1 < params.restart_after:
-                shown = with_place(followed.track, followed.place_filter, followed.placed, measured=False)
+                shown = with_place(followed, followed.place_filter, followed.placed, measured=False)
                 return evolve(followed, track=shown, refused=followed.refused + 1)
             filtered = None
         elif not _is_plausible(filtered, ego_speed_mps):
@@ -161,7 +164,10 @@ def take_place(
     if filtered is None:
         filtered, placed = place_filter.start(sighting, guess.along_mps, guess.sigma_mps), 1
     height_from = _height_from(followed)
-    track = with_place(followed.track, filtered, placed, share, returns=seen.returns, height_from=height_from)
+    run = followed.run if placed > 1 else RangedRun()
+    run = run.then(seen.ranged_sigma_m if seen.ranged_m is not None else None, followed.unplaced_s)
+    followed = evolve(followed, run=run)
+    track = with_place(followed, filtered, placed, share, returns=seen.returns, height_from=height_from)
     return evolve(followed, track=track, place_filter=filtered, placed=placed, unplaced_s=0.0, refused=0)
 
 
@@ -222,7 +228,7 @@ def without_ranges(followed: Followed) -> Followed:
     followed = evolve(followed, height=height, place_filter=_rescaled(followed, height))
     if followed.place_filter is None:
         return followed
-    track = with_place(followed.track, followed.place_filter, followed.placed, height.share(share))
+    track = with_place(followed, followed.place_filter, followed.placed, height.share(share))
     return evolve(followed, track=evolve(track, height_from=_height_from(followed)))
 
 
@@ -288,14 +294,15 @@ def _is_plausible(place: CvState, ego_speed_mps: float | None) -> bool:
 
 
 def with_place(
-    track: VisionTrack, place: CvState, placed: int, share: float | None = None, **others: Any
+    followed: Followed, place: CvState, placed: int, share: float | None = None, **others: Any
 ) -> VisionTrack:
-    """The track with its public numbers, from its filter. ``share``: sigma over distance of the measurement taken in.
-    ``others``: fields that change with them.
+    """The object's track with its public numbers, from its filter. ``share``: sigma over distance of the measurement
+    taken in. ``others``: fields that change with them.
 
     The sigma shown never falls below that of one sighting: most of it is the object's own unknown height, an error
     that no number of sightings averages out.
     """
+    track = followed.track
     x, y, vx, vy = place.mean.tolist()
     range_m, (range_sigma, speed_sigma) = math.hypot(x, y), place_filter.radial_sigmas(place)
     # a line through positions over the time T has σ_v = √3 σ_r / T at its end
@@ -310,7 +317,7 @@ def with_place(
         velocity_mps=(vx, vy) if placed >= 2 else None,
         # what stays wrong with the distance is wrong with its change in the same proportion
         speed_sigma_mps=math.hypot(speed_sigma, share * math.hypot(vx, vy)),
-        wander_mps=_WANDER_SHARE * range_m / math.sqrt(memory_s),
+        wander_mps=followed.run.wander_mps(_WANDER_SHARE * range_m / math.sqrt(memory_s)),
         ranges=placed,
         **others,
     )

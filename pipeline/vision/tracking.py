@@ -181,7 +181,7 @@ def _predicted(followed: Followed, moved: CvState, predicted: PredictedPlace, dt
         "bbox": box_filter.around(moved.mean, followed.track.bbox, growth),
     }
     if place is not None:
-        track = with_place(followed.track, place, followed.placed, **unseen)
+        track = with_place(followed, place, followed.placed, **unseen)
     elif followed.place_filter is not None:
         track = evolve(followed.track, **unseen, distance_m=None, sigma_m=None, position=None, velocity_mps=None)
     else:

@@ -30,6 +30,18 @@ def between_hedges() -> Surroundings:
     return Surroundings(points, np.zeros(len(points), np.int32), np.zeros(len(points), np.uint8), FLAT, (), (), 0.5)
 
 
+def with_rear_at_20_m() -> Surroundings:
+    """The same with eight points on the rear of a vehicle ahead."""
+    rear = np.column_stack([np.full(8, 20.1), np.linspace(-0.8, 0.8, 8), np.full(8, 0.5), np.zeros(8)])
+    hedges = between_hedges()
+    count = len(hedges.points) + 8
+    return hedges._replace(
+        points=np.vstack([hedges.points, rear]).astype(np.float32),
+        kind=np.zeros(count, np.int32),
+        ring=np.zeros(count, np.uint8),
+    )
+
+
 def test_the_path_runs_along_what_stands_beside_it_in_every_frame() -> None:
     state = EdgeState()
     for _ in range(5):
@@ -107,21 +119,25 @@ def test_a_lead_that_has_stopped_is_no_roadside(label: str | None, is_left: int)
     """Provided that the camera saw it drive too; a hedge seems to drive while more of it comes into view."""
     stopped = fused(3, 20.0, 0.0, source="VL" if label else "L", label=label)
     drove = evolve(stopped, surely_moving=True, speed_over_ground_mps=8.0)
-    rear = np.column_stack([np.full(8, 20.1), np.linspace(-0.8, 0.8, 8), np.full(8, 0.5), np.zeros(8)]).astype(
-        np.float32
-    )
-    hedges = between_hedges()
-    seen = hedges._replace(
-        points=np.vstack([hedges.points, rear]).astype(np.float32),
-        kind=np.zeros(len(hedges.points) + 8, np.int32),
-        ring=np.zeros(len(hedges.points) + 8, np.uint8),
-    )
+    seen = with_rear_at_20_m()
     state = EdgeState()
     for item in (drove,) * 6 + (stopped,) * 3:
         state, _ = road_edges.follow(state, seen._replace(objects=(item,)), NOW, PARAMS)
     in_lane = np.abs(state.cells.xy - (20.1, 0.0)).max(axis=1) < 1.2
     assert in_lane.sum() <= is_left
     assert bool(in_lane.any()) is bool(is_left)
+
+
+@pytest.mark.parametrize(("frames", "is_left"), [(4, False), (12, True)], ids=["just now", "for long"])
+def test_a_lead_that_the_lidar_takes_over_is_no_roadside(frames: int, is_left: bool) -> None:
+    """The LiDAR takes half a second to know that what the camera saw drive does."""
+    by_camera = evolve(fused(3, 20.0, source="V"), surely_moving=True, speed_over_ground_mps=8.0)
+    by_both = evolve(fused(3, 20.0), surely_moving=False, speed_over_ground_mps=8.0)
+    seen = with_rear_at_20_m()
+    state = EdgeState()
+    for item in (by_camera,) * 6 + (by_both,) * frames:
+        state, _ = road_edges.follow(state, seen._replace(objects=(item,)), NOW, PARAMS)
+    assert bool((np.abs(state.cells.xy - (20.1, 0.0)).max(axis=1) < 1.2).any()) is is_left
 
 
 @pytest.mark.parametrize(
