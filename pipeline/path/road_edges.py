@@ -73,7 +73,7 @@ class EdgeState:
     """What was found in that frame; None if nothing was."""
     drove_s: Mapping[int, float] = field(default_factory=dict)
     """For how long the LiDAR has seen each object driving, by id."""
-    drives_until_s: Mapping[int, float] = field(default_factory=dict)
+    driving_left_s: Mapping[int, float] = field(default_factory=dict)
     """For how long each object that surely drove still counts as driving, by id."""
 
 
@@ -98,12 +98,12 @@ def follow(
         before = road_structure.standing(before, around.points, around.ring, around.origin, around.sensor_height_m)
     cells = road_structure.merged(before, _seen(around))
     drove_s = _drove_s(state.drove_s, around.objects, dt_s or 0.0)
-    drives_until_s = _drives_until_s(state.drives_until_s, around.objects, dt_s or 0.0)
-    traffic = [item for item in around.objects if item.id in drives_until_s or _is_traffic(item, drove_s)]
+    driving_left_s = _driving_left_s(state.driving_left_s, around.objects, dt_s or 0.0)
+    traffic = [item for item in around.objects if item.id in driving_left_s or _is_traffic(item, drove_s)]
     cells = road_structure.without(cells, traffic)
     used = cells if is_shown else road_structure.thinned(cells)
     if is_shown or len(used.xy) < _FEWEST_CELLS:
-        return EdgeState(cells, drove_s=drove_s, drives_until_s=drives_until_s), None
+        return EdgeState(cells, drove_s=drove_s, driving_left_s=driving_left_s), None
     # The shape with the most structure at a constant distance is the road's, and the nearest structure limits the free
     # width
     starts = road_shape.begin(state.shape, ego, dt_s, state.turn == 0, params)
@@ -112,7 +112,7 @@ def follow(
     left_m, right_m = (np.full(len(shape), each) for each in room_m)
     path = PathEstimate("edges", shape, sigma_m, left_m, right_m)
     edges = Edges(path, used.xy)
-    return EdgeState(cells, shape, (state.turn + 1) % _ANEW_EVERY, edges, drove_s, drives_until_s), edges
+    return EdgeState(cells, shape, (state.turn + 1) % _ANEW_EVERY, edges, drove_s, driving_left_s), edges
 
 
 def _drove_s(before: Mapping[int, float], objects: tuple[FusedObject, ...], dt_s: float) -> Mapping[int, float]:
@@ -123,7 +123,7 @@ def _drove_s(before: Mapping[int, float], objects: tuple[FusedObject, ...], dt_s
     }
 
 
-def _drives_until_s(before: Mapping[int, float], objects: tuple[FusedObject, ...], dt_s: float) -> Mapping[int, float]:
+def _driving_left_s(before: Mapping[int, float], objects: tuple[FusedObject, ...], dt_s: float) -> Mapping[int, float]:
     """Every object that surely drives, or did until a moment ago and is a vehicle to the camera, with the time left for
     which it counts as driving."""
     left = {
