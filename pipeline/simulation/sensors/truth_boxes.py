@@ -5,8 +5,12 @@ are missed more often, and hidden ones are not detected. There are no false posi
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
+from itertools import pairwise
+from operator import or_
 
 import numpy as np
 
@@ -15,7 +19,7 @@ from pipeline.common.geometry import corners_of
 from pipeline.simulation.sensors.detection_model import BoxNoise
 from pipeline.simulation.world.actors import SIZES_M, ActorKind
 from pipeline.simulation.world.world_state import ActorState, World
-from pipeline.types import F64, Box, CameraCalibration, DistanceLaw, RawBoxes
+from pipeline.types import Box, CameraCalibration, DistanceLaw, RawBoxes
 
 LABELS: dict[ActorKind, str] = {
     "car": "car",
@@ -39,6 +43,8 @@ LAW = DistanceLaw(
 _SCORE = 0.9
 _SAMPLES = 24
 """Along each side of a box."""
+_EDGES: list[float] = np.linspace(0.0, 1.0, _SAMPLES + 1).tolist()
+_ALL = (1 << _SAMPLES) - 1
 
 
 @dataclass(frozen=True)
@@ -100,15 +106,22 @@ def visible_part(bbox: Box, nearer: Sequence[Box]) -> tuple[Box, float]:
     is covered: ``bbox`` and 0."""
     if not nearer:
         return bbox, 1.0
-    edges = np.linspace(0.0, 1.0, _SAMPLES + 1)
-    u_edges, v_edges = bbox[0] + edges * (bbox[2] - bbox[0]), bbox[1] + edges * (bbox[3] - bbox[1])
-    u: F64 = ((u_edges[:-1] + u_edges[1:]) / 2)[:, None, None]
-    v: F64 = ((v_edges[:-1] + v_edges[1:]) / 2)[None, :, None]
-    x1, y1, x2, y2 = np.array(nearer).T
-    visible = ~((u > x1) & (u < x2) & (v > y1) & (v < y2)).any(axis=2)
-    columns, rows = np.flatnonzero(visible.any(axis=1)), np.flatnonzero(visible.any(axis=0))
-    if not len(columns):
+    x1, y1, x2, y2 = bbox
+    u_edges, v_edges = [x1 + edge * (x2 - x1) for edge in _EDGES], [y1 + edge * (y2 - y1) for edge in _EDGES]
+    u, v = _middles(u_edges), _middles(v_edges)
+    columns = [_ALL] * _SAMPLES  # one bit for each sample of a column that is visible
+    for left, top, right, bottom in nearer:
+        open_rows = _ALL ^ ((1 << bisect_left(v, bottom)) - 1 & -(1 << bisect_right(v, top)))
+        for n in range(bisect_right(u, left), bisect_left(u, right)):
+            columns[n] &= open_rows
+    rows = reduce(or_, columns)
+    if not rows:
         return bbox, 0.0
-    left, right = u_edges[columns[0]], u_edges[columns[-1] + 1]
-    top, bottom = v_edges[rows[0]], v_edges[rows[-1] + 1]
-    return (float(left), float(top), float(right), float(bottom)), float(visible.mean())
+    seen = [n for n, column in enumerate(columns) if column]
+    lowest, highest = (rows & -rows).bit_length() - 1, rows.bit_length()
+    shown = (u_edges[seen[0]], v_edges[lowest], u_edges[seen[-1] + 1], v_edges[highest])
+    return shown, sum(column.bit_count() for column in columns) / _SAMPLES**2
+
+
+def _middles(edges: Sequence[float]) -> list[float]:
+    return [(one + other) / 2 for one, other in pairwise(edges)]

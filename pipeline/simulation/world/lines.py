@@ -38,8 +38,8 @@ class RoadLine:
         self._arc_starts: list[float] = self._starts.tolist()
         self.straight = not np.any(self._curvature)
         """Whether it does not bend."""
-        self._outer = np.concatenate([[-_LONG_M], self._starts[1:], [float(lengths.sum()) + _LONG_M]])
-        self._ways: tuple[float, F64] | None = None  # the last d, at which most drives stay, and its ways
+        self._outer = [-_LONG_M, *self._arc_starts[1:], float(lengths.sum()) + _LONG_M]
+        self._ways: tuple[float, list[float]] | None = None  # the last d, at which most drives stay, and its ways
 
     def to_world(self, s_m: npt.ArrayLike, d_m: npt.ArrayLike) -> F64:
         """(N, 3) x, y, heading of positions (s, d), each (N,) or a number."""
@@ -77,19 +77,19 @@ class RoadLine:
         """The s reached from ``s_m`` by driving ``way_m`` (negative: against the line) at constant d: in a bend the
         inner way is shorter."""
         ways = self._ways_at(d_m)
-        return float(np.interp(np.interp(s_m, self._outer, ways) + way_m, ways, self._outer))
+        return _interpolated(_interpolated(s_m, self._outer, ways) + way_m, ways, self._outer)
 
     def driven_m(self, from_m: float, to_m: float, d_m: float) -> float:
         """The way from one s to another at constant d, negative against the line: the inverse of ``advance``."""
-        start, end = np.interp([from_m, to_m], self._outer, self._ways_at(d_m))
-        return float(end - start)
+        ways = self._ways_at(d_m)
+        return _interpolated(to_m, self._outer, ways) - _interpolated(from_m, self._outer, ways)
 
-    def _ways_at(self, d_m: float) -> F64:
+    def _ways_at(self, d_m: float) -> list[float]:
         """(A + 1,) the ways at constant d from the beginning to the ends of the arcs."""
         last = self._ways
         if last is None or last[0] != d_m:
             shares = 1.0 - self._curvature * d_m
-            last = self._ways = d_m, np.concatenate([[0.0], np.cumsum(np.diff(self._outer) * shares)])
+            last = self._ways = d_m, [0.0, *np.cumsum(np.diff(self._outer) * shares).tolist()]
         return last[1]
 
 
@@ -109,3 +109,11 @@ def _sinc(x: float) -> float:
     """``np.sinc`` of one number."""
     y = np.pi * x
     return float(np.sin(y)) / y if y else 1.0
+
+
+def _interpolated(x: float, xs: Sequence[float], ys: Sequence[float]) -> float:
+    """``np.interp`` of one number, to the last bit."""
+    at = bisect_right(xs, x) - 1
+    if at < 0 or at + 1 >= len(xs):
+        return ys[max(at, 0)]
+    return (ys[at + 1] - ys[at]) / (xs[at + 1] - xs[at]) * (x - xs[at]) + ys[at]
