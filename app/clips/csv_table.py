@@ -13,7 +13,8 @@ from pipeline.types.result_json import to_json
 
 _OBJECT_FIELDS = (
     "id", "source", "type", "type_score", "distance_m", "distance_sigma_m", "speed_over_ground_mps",
-    "in_path", "in_path_probability", "path_offset_m", "moving", "ttc_s", "carried", "hits", "lidar_points",
+    "speed_over_ground_sigma_mps", "in_path", "in_path_probability", "path_offset_m", "moving", "ttc_s", "carried",
+    "hits", "lidar_points",
 )  # fmt: skip
 _COLUMNS = (
     "frame", "t_ns", "ego_speed_mps", "ego_yaw_rate_radps", "acc_state", "acc_accel_mps2",

@@ -78,8 +78,9 @@ def _described(item: FusedObject, ego: EgoState | None, params: MotionParams, dt
         item,
         ttc_s=ttc,
         speed_over_ground_mps=speed,
+        speed_over_ground_sigma_mps=_speed_sigma_mps(item, dt_s) if _is_one(item) else None,
         moving=speed > params.moving_mps,
-        surely_moving=_is_one(item) and speed - _SURE_SIGMAS * _speed_sigma_mps(item, dt_s) > params.moving_mps,
+        surely_moving=_is_one(item) and speed - _SURE_SIGMAS * _sure_sigma_mps(item, dt_s) > params.moving_mps,
         oncoming=-vx > max(_ONCOMING_MPS, abs(vy)),
     )
 
@@ -89,12 +90,25 @@ def _is_one(item: FusedObject) -> bool:
     return item.ranged or item.boxed_share >= _ONE_SHARE
 
 
-def _speed_sigma_mps(item: FusedObject, dt_s: float) -> float:
-    """Standard deviation of its speed: that of the camera, or that of a line through the sightings of a ranging sensor,
-    one every ``dt_s``."""
+def _speed_sigma_mps(item: FusedObject, dt_s: float) -> float | None:
+    """Standard deviation of its speed; None if it is not known. That of the LiDAR's filter holds once it has settled;
+    until then, the difference of a few sightings tells less."""
+    if item.camera_speed_sigma_mps is not None:
+        return hypot(item.camera_speed_sigma_mps, item.camera_wander_mps)
+    if item.lidar_speed_sigma_mps is None or not item.ranged_steady:
+        return None
+    return max(item.lidar_speed_sigma_mps, _line_sigma_mps(item.ranged_steady, dt_s))
+
+
+def _sure_sigma_mps(item: FusedObject, dt_s: float) -> float:
+    """Standard deviation of its mean speed while it was followed: that of the camera, or that of a line through the
+    sightings of a ranging sensor, one every ``dt_s``."""
     if item.camera_speed_sigma_mps is not None or not item.ranged:
         return hypot(item.camera_speed_sigma_mps or 0.0, item.camera_wander_mps)
-    steady = item.ranged_steady
-    if steady * dt_s < _STEADY_S - _SAME_TIME_S:
-        return inf
-    return _SIGHTING_SIGMA_M * sqrt(12.0 / steady**3) / dt_s
+    is_steady = item.ranged_steady * dt_s >= _STEADY_S - _SAME_TIME_S
+    return _line_sigma_mps(item.ranged_steady, dt_s) if is_steady else inf
+
+
+def _line_sigma_mps(sightings: int, dt_s: float) -> float:
+    """That of the slope of a line through so many sightings, one every ``dt_s``."""
+    return _SIGHTING_SIGMA_M * sqrt(12.0 / sightings**3) / dt_s

@@ -114,6 +114,7 @@ def _joined(item: FusedObject, letter: str, track: RangedTrack) -> FusedObject:
         "distance_sigma_m": track.sigma_m[0],
         "measured": not track.carried,
         "velocity_mps": track.velocity_mps if track.velocity_mps is not None else item.velocity_mps,
+        "lidar_speed_sigma_mps": None if track.velocity_mps is not None else item.lidar_speed_sigma_mps,
         "height_from": None,
         "returns": 0,
     }

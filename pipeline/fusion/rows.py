@@ -89,6 +89,7 @@ def hit_row(
         ranged_hits=hit.hits,
         ranged_steady=hit.steady,
         rigid_mps=hit.rigid_mps,
+        lidar_speed_sigma_mps=hit.speed_sigma_mps,
         gates=gates,
         **by_camera,
     )

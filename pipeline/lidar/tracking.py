@@ -110,14 +110,16 @@ def track(
         sideways = rigid_sideways(history[:, -_SIDES_FRAMES:]).tolist()
 
     # Update matched tracks; carry or drop the others
-    tracks, rows = [], []
+    tracks, rows, sigmas = [], [], np.sqrt(filters.cov[:, 2, 2]).tolist()
     for i, (last, j, speed) in enumerate(zip(state.tracks, partner.tolist(), velocity.tolist(), strict=True)):
         if j >= 0:
             known = (speed[0], speed[1]) if speed[0] == speed[0] else None
             steady = 0 if jumped[i] and last.hits > 1 else last.steady + 1
-            tracks.append(LidarTrack(last.id, sweep[j], known, last.hits + 1, 0, False, 0.0, sideways[i], steady))
+            hits = last.hits + 1
+            tracks.append(LidarTrack(last.id, sweep[j], known, hits, 0, False, 0.0, sideways[i], steady, sigmas[i]))
         elif _lives_on(last, last.unseen_s + dt_s, has_sweep, params):
-            tracks.append(_carried(last, dt_s, expected[i] - state.filters.mean[i] if is_filtered else None))
+            carried = _carried(last, dt_s, expected[i] - state.filters.mean[i] if is_filtered else None)
+            tracks.append(carried if last.hits == 1 else carried._replace(speed_sigma_mps=sigmas[i]))
         else:
             continue
         rows.append(i)

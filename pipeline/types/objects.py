@@ -37,6 +37,8 @@ class LidarTrack(NamedTuple):
     """Speed along ego y, relative to ego, that both of its sides certainly share; None if it is not estimated."""
     steady: int = 1
     """Number of consecutive sightings near the predicted position, including the first sighting."""
+    speed_sigma_mps: float | None = None
+    """Standard deviation of each part of its velocity, by its filter; None until the second sighting."""
 
 
 @dataclass(frozen=True)
@@ -160,6 +162,9 @@ class FusedObject:
     """The tests of this object, for display."""
     speed_over_ground_mps: float | None = None
     """None while own speed is unknown."""
+    speed_over_ground_sigma_mps: float | None = None
+    """Its standard deviation; None where it is not known, as for what the camera alone sees in less than half of the
+    images."""
     oncoming: bool | None = None
     """Whether it drives in the opposite direction, within 45°; None while own speed is unknown."""
     moving: bool | None = None
@@ -197,6 +202,8 @@ class FusedObject:
     """Standard deviation of its velocity along the line of sight, if that comes from its image boxes."""
     camera_wander_mps: float = 0.0
     """As ``VisionTrack.wander_mps``: decides whether it may be standing."""
+    lidar_speed_sigma_mps: float | None = None
+    """Standard deviation of its velocity, if that comes from the LiDAR."""
     boxed_share: float = 1.0
     """As ``VisionTrack.boxed_share``; 1 without a vision track."""
     returns: int = 0

@@ -134,7 +134,7 @@ def _own_motion(own: OwnMotion | None) -> dict[str, Any] | None:
     }
 
 
-_NUMBERS = 34
+_NUMBERS = 35
 """Numbers of an object besides its gates, in the order of ``_numbers_of``."""
 _NAN2, _NAN3, _NAN4 = ((math.nan,) * count for count in (2, 3, 4))
 _NO_CUBOID = (_NAN3, _NAN3, math.nan)
@@ -164,6 +164,7 @@ def _numbers_of(each: FusedObject) -> tuple[float | None, ...]:
         each.distance_m,
         each.distance_sigma_m,
         each.speed_over_ground_mps,
+        each.speed_over_ground_sigma_mps,
         each.existence,
         each.in_path_probability,
         each.path_offset_m,
@@ -185,24 +186,25 @@ def _numbers_of(each: FusedObject) -> tuple[float | None, ...]:
 
 def _object(each: FusedObject, numbers: list[float | None], of_gates: list[float | None]) -> dict[str, Any]:
     """One object. numbers: those of ``_numbers_of``, rounded; of_gates: value and limit of each gate, likewise."""
-    score, distance, sigma, over_ground, existence, probability, offset, lateral, crossing, ttc = numbers[:10]
-    center, size, yaw_rad = numbers[19:22], numbers[22:25], numbers[25]
-    has_cuboid = None not in numbers[19:26]
+    score, distance, sigma, speed, speed_sigma, existence, probability, offset, lateral, crossing, ttc = numbers[:11]
+    center, size, yaw_rad = numbers[20:23], numbers[23:26], numbers[26]
+    has_cuboid = None not in numbers[20:27]
     return {
         "id": each.id,
         "source": each.source,
         "type": each.label,
         "type_score": score,
-        "bbox": _whole(numbers[12:16]),
-        "bev": None if None in numbers[26:] else [numbers[26:28], numbers[28:30], numbers[30:32], numbers[32:34]],
+        "bbox": _whole(numbers[13:17]),
+        "bev": None if None in numbers[27:] else [numbers[27:29], numbers[29:31], numbers[31:33], numbers[33:35]],
         "cuboid": {"center": center, "size": size, "yaw_rad": yaw_rad} if has_cuboid else None,
-        "closest_point": _whole(numbers[16:19]),
+        "closest_point": _whole(numbers[17:20]),
         "distance_m": distance,
         "distance_sigma_m": sigma,
         "distance_from": each.distance_from,
         "height_from": each.height_from,
-        "velocity_mps": _whole(numbers[10:12]),
-        "speed_over_ground_mps": over_ground,
+        "velocity_mps": _whole(numbers[11:13]),
+        "speed_over_ground_mps": speed,
+        "speed_over_ground_sigma_mps": speed_sigma,
         "in_path": each.in_path,
         "existence_probability": existence,
         "in_path_probability": probability,

@@ -25,6 +25,7 @@
  * @property {number|null} distance_sigma_m
  * @property {Point2|null} velocity_mps
  * @property {number|null} speed_over_ground_mps
+ * @property {number|null} speed_over_ground_sigma_mps  its standard deviation
  * @property {boolean} in_path
  * @property {number|null} existence_probability
  * @property {number|null} in_path_probability

@@ -130,3 +130,23 @@ def test_boxes_that_hop_or_wander_prove_no_motion(
     seen = evolve(fused(1, 40.0, source=source), boxed_share=share, camera_wander_mps=wander_mps)
     (item,) = describe([seen], EgoState(0, 10.0, 0.0), PARAMS)
     assert item.surely_moving is surely
+
+
+@pytest.mark.parametrize(
+    ("known", "sigma_mps"),
+    [
+        pytest.param({"camera_speed_sigma_mps": 3.0, "camera_wander_mps": 4.0}, 5.0, id="boxes that wander"),
+        pytest.param({"camera_speed_sigma_mps": 3.0, "boxed_share": 0.2}, None, id="another car each time, perhaps"),
+        pytest.param({}, None, id="nobody says how well"),
+        pytest.param({"lidar_speed_sigma_mps": 0.5, "ranged_steady": 30}, 0.5, id="the LiDAR's filter, settled"),
+        pytest.param({"lidar_speed_sigma_mps": 0.6, "ranged_steady": 4}, 0.866, id="four sightings of 0.2 m each"),
+        pytest.param({"lidar_speed_sigma_mps": 0.5, "ranged_steady": 0}, None, id="it has just jumped"),
+    ],
+)
+def test_how_well_the_speed_over_ground_is_known(known: dict[str, float], sigma_mps: float | None) -> None:
+    seen = evolve(fused(1, 40.0, source="VL" if "ranged_steady" in known else "V"), **known)
+    (item,) = describe([seen], EgoState(0, 10.0, 0.0), PARAMS)
+    expected = pytest.approx(sigma_mps, abs=0.001) if sigma_mps is not None else None
+    assert item.speed_over_ground_sigma_mps == expected
+    (without_ego_speed,) = describe([seen], None, PARAMS)
+    assert without_ego_speed.speed_over_ground_sigma_mps is None

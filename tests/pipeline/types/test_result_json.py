@@ -45,8 +45,8 @@ FIELDS = {
     "own_motion.sources.0": "source speed_mps yaw_rate_radps",
     "objects.0": "id source type type_score bbox bev cuboid closest_point distance_m distance_sigma_m distance_from "
     "height_from velocity_mps "
-    "speed_over_ground_mps in_path existence_probability in_path_probability path_offset_m lateral_mps crossing_s "
-    "moving ttc_s carried "
+    "speed_over_ground_mps speed_over_ground_sigma_mps in_path existence_probability in_path_probability path_offset_m "
+    "lateral_mps crossing_s moving ttc_s carried "
     "seen_by hits lidar_points gates",
     "objects.0.cuboid": "center size yaw_rad",
     "objects.0.gates.0": "name value limit passed",
@@ -81,6 +81,7 @@ def whole_result() -> Result:
         vision_track=2,
         gates=(Gate("iou", 0.7, 0.1, True),),
         speed_over_ground_mps=13.0,
+        speed_over_ground_sigma_mps=0.4,
         moving=True,
         ttc_s=8.0,
         in_path=True,

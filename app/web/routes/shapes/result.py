@@ -52,6 +52,8 @@ class ObjectJson(Exact):
     """x, y relative to ego; null until seen twice."""
     speed_over_ground_mps: float | None
     """Null where ego speed is unknown."""
+    speed_over_ground_sigma_mps: float | None
+    """Its standard deviation; null where it is not known."""
     in_path: bool
     """Whether ``in_path_probability`` is over one half."""
     existence_probability: float | None
