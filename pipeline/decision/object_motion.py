@@ -93,7 +93,7 @@ def _is_one(item: FusedObject) -> bool:
 def _speed_sigma_mps(item: FusedObject, dt_s: float) -> float | None:
     """Standard deviation of its speed; None if it is not known. That of the LiDAR's filter holds once it has settled;
     until then, the difference of a few sightings tells less."""
-    if item.camera_speed_sigma_mps is not None:
+    if item.camera_speed_sigma_mps is not None and not item.ranged:
         return hypot(item.camera_speed_sigma_mps, item.camera_wander_mps)
     if item.lidar_speed_sigma_mps is None or not item.ranged_steady:
         return None

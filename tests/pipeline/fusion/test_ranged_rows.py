@@ -81,3 +81,17 @@ def test_an_object_keeps_its_id_from_sensor_to_sensor() -> None:
 def test_a_carried_track_is_no_sighting() -> None:
     _, (item,) = objects(FusionState(), radar=(radar_track(1, 54.0, carried=True),))
     assert (item.source, item.seen_by, item.carried, item.measured) == ("R", "", True, False)
+
+
+@pytest.mark.parametrize(("radar", "sigma_mps"), [((), 0.5), ((radar_track(1, 30.6),), 0.5)])
+def test_the_lidars_velocity_comes_with_its_sigma(radar: tuple[RangedTrack, ...], sigma_mps: float) -> None:
+    seen = lidar_track(1, 30.0)._replace(speed_sigma_mps=sigma_mps)
+    _, (item,) = objects(FusionState(), lidar=(seen,), radar=radar)
+    assert item.lidar_speed_sigma_mps == sigma_mps
+
+
+def test_a_radars_velocity_does_not_come_with_the_lidars_sigma() -> None:
+    unseen = lidar_track(1, 30.0)._replace(speed_sigma_mps=0.5, carried=True)
+    state, _ = objects(FusionState(), lidar=(lidar_track(1, 30.0),), radar=(radar_track(1, 30.6),))
+    _, (item,) = objects(state, lidar=(unseen,), radar=(radar_track(1, 30.6),))
+    assert (item.velocity_mps, item.lidar_speed_sigma_mps) == ((-5.0, 0.0), None)

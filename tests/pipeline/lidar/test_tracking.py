@@ -232,3 +232,16 @@ def test_a_missed_track_comes_nearer_as_fast_as_the_car_now_drives(speed_mps: fl
     assert carried.obstacle.closest_point[0] == pytest.approx(
         25.0 - (10.0 + speed_mps) / 20.0 - speed_mps / 5.0, abs=0.1
     )
+
+
+@pytest.mark.parametrize("filter_name", FILTERS)
+def test_a_velocity_is_known_better_with_each_sighting_and_worse_while_it_is_not_seen(filter_name: str) -> None:
+    params = LidarTrackingParams(filter=filter_name)  # type: ignore[arg-type]
+    seen = _drive([*((_car(30.0 - 0.3 * k),) for k in range(20)), (), ()], params)
+    first, *later = (tracks[0].speed_sigma_mps for tracks in seen)
+    assert first is None, "one sighting says nothing"
+    known = [sigma for sigma in later if sigma is not None]
+    assert len(known) == 21
+    assert known[0] > 1.0 > known[2] > known[18]
+    assert known[18] == pytest.approx(0.49, abs=0.01), "3 m/s² for 0.1 s at a time, positions to 0.15 m"
+    assert known[18] < known[19] < known[20]
