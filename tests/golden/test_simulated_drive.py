@@ -95,8 +95,8 @@ SAME_PLACE_M = 1.0
 
 
 def test_speeds_over_ground_are_known_as_well_as_is_said(drive: dict[str, list[dict[str, Any]]]) -> None:
-    """Two standard deviations hold nine of ten errors of what both sensors see. Of what the camera alone sees, fewer: half
-    of the others are of a single vehicle, 90 m ahead, for two seconds."""
+    """Two standard deviations hold nine of ten errors of what both sensors see. Of what the camera alone sees, they
+    hold fewer: most of the others are of a single vehicle, 90 m ahead, for two seconds."""
     scene, held, counted = scenario.load("straight"), Counter[str](), Counter[str]()
     for result in drive["both sensors"]:
         actors = world_state.at(scene, result["t_ns"] / 1e9).actors
