@@ -83,11 +83,11 @@ def test_a_carried_track_is_no_sighting() -> None:
     assert (item.source, item.seen_by, item.carried, item.measured) == ("R", "", True, False)
 
 
-@pytest.mark.parametrize(("radar", "sigma_mps"), [((), 0.5), ((radar_track(1, 30.6),), 0.5)])
-def test_the_lidars_velocity_comes_with_its_sigma(radar: tuple[RangedTrack, ...], sigma_mps: float) -> None:
-    seen = lidar_track(1, 30.0)._replace(speed_sigma_mps=sigma_mps)
-    _, (item,) = objects(FusionState(), lidar=(seen,), radar=radar)
-    assert item.lidar_speed_sigma_mps == sigma_mps
+@pytest.mark.parametrize("also", [(), (radar_track(1, 30.6),)])
+def test_the_lidars_velocity_comes_with_its_sigma(also: tuple[RangedTrack, ...]) -> None:
+    seen = lidar_track(1, 30.0)._replace(speed_sigma_mps=0.5)
+    _, (item,) = objects(FusionState(), lidar=(seen,), radar=also)
+    assert item.lidar_speed_sigma_mps == 0.5
 
 
 def test_a_radars_velocity_does_not_come_with_the_lidars_sigma() -> None:
